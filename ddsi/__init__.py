@@ -1,0 +1,1 @@
+"""A complete RTPS/DDSI stack in pure Python."""

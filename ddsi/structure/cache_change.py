@@ -1,0 +1,79 @@
+"""CacheChange: one change to one instance, as writers keep it and readers receive it.  RTPS 2.5 §8.2.6."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+from .guid import GUID_UNKNOWN, Guid
+
+__all__ = ["CacheChange", "ChangeKind", "StatusInfo"]
+
+
+class StatusInfo(IntFlag):
+    """The last octet of PID_STATUS_INFO.  RTPS 2.5 §9.6.4.9."""
+
+    DISPOSED = 1
+    UNREGISTERED = 2
+    FILTERED = 4
+
+
+class ChangeKind(IntEnum):
+    """What happened to the instance; the number is the StatusInfo that says so on the wire."""
+
+    ALIVE = 0
+    NOT_ALIVE_DISPOSED = 1
+    NOT_ALIVE_UNREGISTERED = 2
+    NOT_ALIVE_DISPOSED_UNREGISTERED = 3
+
+
+class CacheChange:
+    """One change.  A plain slotted class, as tens of thousands are made in a second.
+
+    ``payload`` is the SerializedPayload with its encapsulation header: of the whole sample when ``kind``
+    is ALIVE, else of the key alone, or empty where only ``key_hash`` names the instance.
+    ``key`` is the instance's key in the canonical form (see ``xtypes``), empty for keyless topics.
+    ``source_timestamp`` counts ticks (2^-32 s since 1970).  ``destination`` is the participant or reader that
+    the change is meant for, GUID_UNKNOWN for everybody (the filtered path; DDS-Security 1.1 §7.4.4.4).
+    ``related`` is who and which sample this one answers: PID_RELATED_SAMPLE_IDENTITY's (Guid, number).
+    """
+
+    __slots__ = (
+        "destination",
+        "expiry",
+        "key",
+        "key_hash",
+        "kind",
+        "payload",
+        "related",
+        "sequence_number",
+        "source_timestamp",
+        "writer_guid",
+    )
+
+    def __init__(
+        self,
+        kind: ChangeKind,
+        writer_guid: Guid,
+        sequence_number: int,
+        payload: bytes | bytearray | memoryview,
+        key: bytes = b"",
+        source_timestamp: int = 0,
+        *,
+        key_hash: bytes = b"",
+        destination: Guid = GUID_UNKNOWN,
+        related: tuple[Guid, int] | None = None,
+        expiry: float = float("inf"),
+    ) -> None:
+        self.kind = kind
+        self.writer_guid = writer_guid
+        self.sequence_number = sequence_number
+        self.payload = payload
+        self.key = key
+        self.source_timestamp = source_timestamp
+        self.key_hash = key_hash
+        self.destination = destination
+        self.related = related
+        self.expiry = expiry
+
+    def __repr__(self) -> str:
+        return f"<CacheChange {self.kind.name} {self.writer_guid}#{self.sequence_number}, {len(self.payload)} octets>"
