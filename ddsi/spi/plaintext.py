@@ -1,0 +1,105 @@
+"""PLAINTEXT: the hooks of a participant without security.
+
+The shortest description of what each hook may return; everybody is admitted, nothing is transformed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.guid import Guid, GuidPrefix
+
+from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, ProtectedEndpoint
+from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
+
+__all__ = ["PLAINTEXT", "Plaintext"]
+
+_NO_ANNOUNCEMENT = Announcement()
+_UNPROTECTED = ProtectedEndpoint()
+
+
+class Plaintext:
+    """Implements :class:`ddsi.spi.SecurityHooks` by letting everything pass as it is.  It has no state."""
+
+    __slots__ = ()
+
+    def local_participant(self, candidate: LocalParticipant) -> Guid:
+        return candidate.guid
+
+    def announcement(self) -> Announcement:
+        return _NO_ANNOUNCEMENT
+
+    def local_writer(self, data: DiscoveredWriterData) -> ProtectedEndpoint:
+        return _UNPROTECTED
+
+    def local_reader(self, data: DiscoveredReaderData) -> ProtectedEndpoint:
+        return _UNPROTECTED
+
+    def local_endpoint_changed(self, data: DiscoveredWriterData | DiscoveredReaderData) -> ProtectedEndpoint:
+        return _UNPROTECTED
+
+    def local_endpoint_deleted(self, guid: Guid) -> None:
+        """Nothing was kept."""
+
+    def remote_participant(self, data: DiscoveredParticipantData, now: float) -> Admission:
+        return ADMITTED
+
+    def remote_participant_changed(self, data: DiscoveredParticipantData, now: float) -> Admission:
+        return ADMITTED
+
+    def remote_participant_lost(self, guid: Guid) -> None:
+        """Nothing was kept."""
+
+    def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
+        return ADMITTED
+
+    def unmatch(self, local: Guid, remote: Guid) -> None:
+        """Nothing was kept."""
+
+    def receive_message(self, change: CacheChange, now: float) -> None:
+        """The endpoints of generic messages are not announced, so none comes."""
+
+    def computed(self, effect: Compute, result: object, now: float) -> None:
+        """Nothing was asked."""
+
+    def handle_timeout(self, now: float) -> None:
+        """No timer was asked for."""
+
+    def next_deadline(self) -> float:
+        return math.inf
+
+    def drain_effects(self) -> Sequence[HookEffect]:
+        return ()
+
+    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        return NO_OVERHEAD
+
+    def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
+        return payload
+
+    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Octets) -> Octets:
+        return submessage
+
+    def encode_message(self, receivers: Sequence[Guid], message: Octets) -> Octets:
+        return message
+
+    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+        return NOT_FOR_US  # protected: we have no keys, so it cannot be meant for us
+
+    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+        return NOT_FOR_US
+
+    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        return payload
+
+    def admits_clear_message(self, source: bytes) -> bool:
+        return True
+
+    def admits_clear_submessage(self, sender: bytes) -> bool:
+        return True
+
+
+PLAINTEXT = Plaintext()
