@@ -1,4 +1,4 @@
-"""``Config``: everything about a participant that is not QoS, as one value.  RTPS leaves all of it to the implementation.
+"""``Config``: everything about a participant that is not QoS, as one value.  RTPS leaves it to the implementation.
 
 The same settings as ``DDSI_URI`` holds, typed.  A Config is checked when it is made and never changes; whether an
 interface of that name exists, or a peer's name resolves, is found out by the transport.
@@ -23,12 +23,12 @@ TraceLevel = Literal["severe", "warning", "info", "config", "fine", "finer", "fi
 """How much to record, least first; the words are Cyclone's."""
 
 HIGHEST_PARTICIPANT_INDEX = 119
-"""Beyond it the unicast ports would run into those of the next domain (RTPS 2.5 §9.6.2.3, with its default gains)."""
+"""Beyond it the unicast ports run into those of the next domain (RTPS 2.5 §9.6.2.3, with its default gains)."""
 
 _MIB = 1 << 20
 # The largest payload of an IPv4 UDP datagram: 65535 less 20 octets of IP header and 8 of UDP.
 _LARGEST_DATAGRAM = 65507
-# An RTPS header, a DATA_FRAG with its INFO_DST, INFO_TS and HEARTBEAT, protected: a message must hold that and some data.
+# An RTPS header, a DATA_FRAG with its INFO_DST, INFO_TS and HEARTBEAT, protected: a message holds that and some data.
 _SMALLEST_MESSAGE = 512
 # RTPS 2.5 §9.6.3, domainTag is a string<256>, and one octet of it ends the string.
 _LONGEST_TAG = 255
@@ -56,11 +56,11 @@ class Config:
     """Who else to announce to, by unicast: ``host``, ``host:port`` or ``[IPv6]:port``.  A host without a port is tried
     at participant indices 0 to ``max_auto_participant_index``."""
     participant_index: int | Literal["auto", "none"] = "auto"
-    """Which well-known unicast ports to listen on.  ``auto``: the first free index from 0; ``none``: any free ports, only
-    for those who hear our announcements; a number: that one, or fail."""
+    """Which well-known unicast ports to listen on.  ``auto``: the first free index from 0; ``none``: any free ports,
+    only for those who hear our announcements; a number: that one, or fail."""
     max_auto_participant_index: int = 9
-    """The highest index that ``auto`` tries and that hosts in ``peers`` are probed at.  Each costs every host in ``peers``
-    one more datagram per announcement, so 9 is enough for ten participants on a host; raise it for more."""
+    """The highest index that ``auto`` tries and that hosts in ``peers`` are probed at.  Each index costs a datagram
+    more per such host and announcement; 9 is enough for ten participants on a host, raise it for more."""
     ports: PortMapping = PortMapping()
     """The constants of the port expressions, RTPS 2.5 §9.6.2.3."""
 
@@ -68,7 +68,7 @@ class Config:
     domain_tag: str = ""
     """Participants meet only those with the same tag (RTPS 2.5 §8.5.3.2, domainTag); at most 255 octets of UTF-8."""
     lease_duration: float = 20.0
-    """After how many seconds of silence others shall forget us.  20 s as Fast DDS: it survives a few lost announcements."""
+    """After how many seconds of silence others shall forget us.  20 s, as Fast DDS: a few announcements may be lost."""
     spdp_interval: float | None = None
     """Seconds between announcements, once the first quick ones are out.  None: see :attr:`announcement_period`."""
 
@@ -101,7 +101,7 @@ class Config:
 
     # --- tracing ---
     trace_file: str = ""
-    """Where events go, one JSON object a line: a path, ``stdout`` or ``stderr``.  Empty: tracing is off and costs nothing."""
+    """Where events go, one JSON object a line: a path, ``stdout`` or ``stderr``.  Empty: tracing is off, at no cost."""
     trace_level: TraceLevel = "finest"
     trace_append: bool = False
     """Keep what the file already holds?"""

@@ -37,7 +37,7 @@ class PortMapping:
                 raise ConfigurationError(
                     f"ports.{item.name} is {value!r}; it must be a whole number from 0 to {HIGHEST_PORT}"
                 )
-        if not 1 <= self.base:
+        if self.base < 1:
             raise ConfigurationError("ports.base is 0; it must be at least 1, as port 0 means any port")
 
     def metatraffic_multicast(self, domain_id: int) -> int:
@@ -58,7 +58,8 @@ class PortMapping:
         port = self.base + self.domain_gain * domain_id + offset + self.participant_gain * participant_index
         if not 1 <= port <= HIGHEST_PORT:
             raise ConfigurationError(
-                f"domain {domain_id} with participant index {participant_index} needs port {port}, beyond {HIGHEST_PORT} "
+                f"domain {domain_id} with participant index {participant_index} needs port {port}, "
+                f"beyond {HIGHEST_PORT} "
                 f"(ports.base {self.base}, domain_gain {self.domain_gain}, {offset_name} {offset}); "
                 "choose a lower domain id or participant index, or other port numbers on every participant"
             )

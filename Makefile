@@ -1,0 +1,81 @@
+# Everything sets itself up: `make demo` and `make test` work in a fresh clone.
+#
+# On Debian and its relatives a bare machine lacks two packages: make and python3-venv.
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+PACKAGES := $(wildcard ddsi tests multiproc_tests examples benchmarks)
+TYPED := $(PACKAGES) typings/ddsi_security
+
+# Tests and the demo stay on this host, whatever the machine is connected to.
+export DDSI_URI := <DDSI><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></DDSI>
+export CYCLONEDDS_URI := <CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></CycloneDDS>
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test quick lint format interop bench clean
+
+help:  ## Say what can be made
+	@grep -hE '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
+
+demo: $(VENV)/.ready-to-run  ## Live data between processes, under a minute
+	$(BIN)/ddsi demo
+
+test: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## All tests; those with other stacks where these are installed
+	$(BIN)/python -m pytest $(wildcard tests multiproc_tests) $(ARGS)
+
+quick: $(VENV)/.ready-to-test  ## The tests that take milliseconds, without other processes
+	$(BIN)/python -m pytest -m "not slow and not peers" tests $(ARGS)
+
+lint: $(VENV)/.ready-to-lint  ## ruff, mypy, pyright
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy $(TYPED)
+	$(BIN)/pyright
+
+format: $(VENV)/.ready-to-lint  ## Let ruff lay out the code
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+interop: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## Every case with every peer; writes docs/interop
+	$(BIN)/python -m multiproc_tests.interop $(ARGS)
+
+bench: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## Beside the C-backed binding, as ratios
+	$(BIN)/python -m benchmarks $(ARGS)
+
+clean:  ## Remove what was made, the virtual environment too
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find $(PACKAGES) security -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# --- the virtual environment: each stamp file stands for what is installed in it ---
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo >&2 "ddsi needs Python 3.11 or later, and '$(PYTHON)' is not: install the Debian package python3," \
+	           "or say which to use: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
+	  echo >&2 "'$(PYTHON)' cannot make virtual environments: install the Debian package python3-venv" \
+	           "(apt-get install python3-venv)"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	@touch $@
+
+$(VENV)/.ready-to-run: $(VENV)/.made pyproject.toml
+	$(BIN)/python -m pip install --quiet -e '.[all]'
+	@touch $@
+
+$(VENV)/.ready-to-test: $(VENV)/.ready-to-run pyproject.toml
+	$(BIN)/python -m pip install --quiet --group test
+	@touch $@
+
+$(VENV)/.ready-to-lint: $(VENV)/.ready-to-test pyproject.toml
+	$(BIN)/python -m pip install --quiet --group lint
+	@touch $@
+
+# There are no wheels of the peers for every platform, so doing without them is an error only where they are required.
+$(VENV)/.ready-with-peers: $(VENV)/.ready-to-run pyproject.toml
+	@echo '$(BIN)/python -m pip install --quiet --group peers'
+	@$(BIN)/python -m pip install --quiet --group peers || { test -z "$(DDSI_REQUIRE_PEERS)" && \
+	  echo >&2 "The peers from PyPI cannot be installed here; the tests that need them will be skipped."; }
+	@touch $@
