@@ -19,7 +19,7 @@ from ..structure.locator import Locator
 from ..structure.sequence_number import MAX_SET_BITS, NumberSet
 from ..structure.time import duration_from_wire, duration_to_wire
 
-__all__ = ["Octets", "Reader", "Writer"]
+__all__ = ["Octets", "Reader", "Writer", "bitmap_words"]
 
 Octets = bytes | bytearray | memoryview
 """What parsers take: anything that slices to octets."""
@@ -284,11 +284,9 @@ class Writer:
         self._number_set(numbers)
 
     def _number_set(self, numbers: NumberSet) -> None:
-        word_count = (numbers.num_bits + 31) // 32
-        bitmap = numbers.bitmap << (32 * word_count - numbers.num_bits)
-        words = [bitmap >> 32 * (word_count - 1 - index) & 0xFFFFFFFF for index in range(word_count)]
+        words = bitmap_words(numbers)
         self.u32(numbers.num_bits)
-        self._buffer += self._order.words[word_count].pack(*words)
+        self._buffer += self._order.words[len(words)].pack(*words)
 
     def ticks(self, ticks: int) -> None:
         self._buffer += self._order.unsigned_pair.pack(ticks >> 32, ticks & 0xFFFFFFFF)
@@ -321,3 +319,10 @@ class Writer:
     def sequence_length(self, count: int) -> None:
         self.align(4)
         self.u32(count)
+
+
+def bitmap_words(numbers: NumberSet) -> list[int]:
+    """The bitmap as 0 to 8 words of 32 bits, the most significant bit of the first standing for the base."""
+    word_count = (numbers.num_bits + 31) // 32
+    bitmap = numbers.bitmap << (32 * word_count - numbers.num_bits)
+    return [bitmap >> 32 * (word_count - 1 - index) & 0xFFFFFFFF for index in range(word_count)]
