@@ -1,0 +1,364 @@
+"""ReaderHistoryCache: the samples that an application has not taken yet, by instance.  Other name: RHC.
+
+DDS 1.4 §2.2.2.5 (Subscription Module: states, ranks, generation counts), §2.2.3.18-19 (HISTORY, RESOURCE_LIMITS).
+Samples come here in the order that RTPS established and leave in the order of arrival.  It holds octets, not data:
+deserialising is done when a sample is taken, by whoever takes it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from copy import copy
+
+from ddsi.structure.cache_change import CacheChange, ChangeKind, StatusInfo
+from ddsi.structure.guid import Guid
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.qos_policies import LENGTH_UNLIMITED, KeepLast
+from ddsi.structure.sample_info import (
+    ANY_INSTANCE_STATE,
+    ANY_SAMPLE_STATE,
+    ANY_VIEW_STATE,
+    InstanceState,
+    SampleInfo,
+    SampleState,
+    ViewState,
+)
+
+__all__ = ["Instance", "ReaderHistoryCache", "SampleSelector"]
+
+_COMPACT_ABOVE = 64
+_NOT_NEW = ViewState.NOT_NEW
+_NEW = ViewState.NEW
+_ALIVE = InstanceState.ALIVE
+_READ = SampleState.READ
+
+SampleSelector = Callable[[SampleInfo], bool]
+
+
+class Instance:
+    """One instance: its samples (oldest first), who writes it, and its states."""
+
+    __slots__ = (
+        "disposed_generation_count",
+        "key",
+        "no_writers_generation_count",
+        "rank",
+        "samples",
+        "state",
+        "view_state",
+        "writers",
+    )
+
+    def __init__(self, key: bytes) -> None:
+        self.key = key
+        self.samples: deque[SampleInfo] = deque()
+        self.writers: set[bytes] = set()
+        self.state = _ALIVE
+        self.view_state = _NEW
+        self.disposed_generation_count = 0
+        self.no_writers_generation_count = 0
+        self.rank = 0
+
+    @property
+    def generation(self) -> int:
+        return self.disposed_generation_count + self.no_writers_generation_count
+
+
+class ReaderHistoryCache:
+    """A ChangeSink for application readers.
+
+    ``on_news`` is called when something can be read and the last such call has been cleared by :meth:`seen`;
+    ``on_rejected`` with the name of a limit, for best-effort samples that find no room.
+    """
+
+    def __init__(
+        self,
+        qos: EndpointQos,
+        *,
+        max_octets: int,
+        max_instances: int,
+        clock_offset: float = 0.0,
+        on_news: Callable[[], None] = lambda: None,
+        on_rejected: Callable[[str], None] = lambda reason: None,
+    ) -> None:
+        """``max_octets``, ``max_instances``: bounds beside the QoS, so that no peer can fill the memory.
+
+        ``clock_offset``: seconds to add to the engine's clock to have wall time.
+        """
+        limits = qos.resource_limits
+        unlimited = LENGTH_UNLIMITED
+        self._depth = qos.history.depth if isinstance(qos.history, KeepLast) else 0
+        self._max_samples = limits.max_samples if limits.max_samples != unlimited else 0
+        self._max_per_instance = limits.max_samples_per_instance if limits.max_samples_per_instance != unlimited else 0
+        self._max_instances = min(limits.max_instances, max_instances) if limits.max_instances != unlimited else max_instances
+        self._max_octets = max_octets
+        self._is_reliable = qos.is_reliable
+        self._clock_offset = clock_offset
+        self._on_news = on_news
+        self._on_rejected = on_rejected
+        self._has_news = False
+        self._instances: dict[bytes, Instance] = {}
+        # In order of arrival.  What was taken from the middle or pushed out stays until it comes to the front
+        # or the queue is compacted; such a sample has no change any more.
+        self._order: deque[SampleInfo] = deque()
+        self._removed_count = 0
+        self._octets = 0
+
+    def __len__(self) -> int:
+        """How many samples can be read or taken."""
+        return len(self._order) - self._removed_count
+
+    @property
+    def octets(self) -> int:
+        return self._octets
+
+    @property
+    def instances(self) -> dict[bytes, Instance]:
+        """The known instances by key.  For looking up only."""
+        return self._instances
+
+    # --- what comes in -----------------------------------------------------------------------------------
+
+    def add(self, change: CacheChange, now: float) -> bool:
+        """Take one change; False when a reliable writer's has to wait until the application has taken something."""
+        instance = self._instances.get(change.key)
+        if instance is None:
+            if change.kind is not ChangeKind.ALIVE:
+                return True  # the end of something that nobody here has heard of
+            if len(self._instances) >= self._max_instances:
+                return self._no_room("max_instances")
+            instance = self._instances[change.key] = Instance(change.key)
+        if change.kind is not ChangeKind.ALIVE:
+            self._add_end(instance, change, now)
+            return True
+        samples = instance.samples
+        if self._depth:
+            if len(samples) >= self._depth:
+                self._push_out(instance)
+        else:
+            limit = self._limit_reached(instance, len(change.payload))
+            if limit is not None:
+                return self._no_room(limit)
+        if instance.state is not _ALIVE:
+            self._revive(instance)
+        if change.writer_guid not in instance.writers:
+            instance.writers.add(change.writer_guid)
+        info = SampleInfo(change, now + self._clock_offset, valid_data=True)
+        info.disposed_generation_count = instance.disposed_generation_count
+        info.no_writers_generation_count = instance.no_writers_generation_count
+        samples.append(info)
+        self._order.append(info)
+        self._octets += len(change.payload)
+        if not self._has_news:
+            self._has_news = True
+            self._on_news()
+        return True
+
+    def writer_lost(self, writer: Guid, now: float) -> None:
+        """A writer was unmatched, or its liveliness was lost: it no longer writes any instance."""
+        for instance in list(self._instances.values()):
+            if writer in instance.writers:
+                instance.writers.discard(writer)
+                if not instance.writers and instance.state is _ALIVE:
+                    nobody = CacheChange(ChangeKind.NOT_ALIVE_UNREGISTERED, writer, 0, b"", instance.key)
+                    self._end(instance, InstanceState.NOT_ALIVE_NO_WRITERS, nobody, now)
+                self._purge(instance)
+
+    def _add_end(self, instance: Instance, change: CacheChange, now: float) -> None:
+        """Dispose, unregister, or both.  DDS 1.4 figure 2.11: disposed wins until somebody writes again."""
+        if change.kind & StatusInfo.DISPOSED and instance.state is not InstanceState.NOT_ALIVE_DISPOSED:
+            self._end(instance, InstanceState.NOT_ALIVE_DISPOSED, change, now)
+        if change.kind & StatusInfo.UNREGISTERED:
+            instance.writers.discard(change.writer_guid)
+            if not instance.writers and instance.state is _ALIVE:
+                self._end(instance, InstanceState.NOT_ALIVE_NO_WRITERS, change, now)
+            self._purge(instance)
+
+    def _end(self, instance: Instance, state: InstanceState, change: CacheChange, now: float) -> None:
+        """The instance is not alive any more: a sample without data says so, one at most at the end of its queue."""
+        instance.state = state
+        last = instance.samples[-1] if instance.samples else None
+        if last is None or last.valid_data or last.sample_state is _READ:
+            info = SampleInfo(change, now + self._clock_offset, valid_data=False)
+            info.instance_handle = instance.key
+            info.disposed_generation_count = instance.disposed_generation_count
+            info.no_writers_generation_count = instance.no_writers_generation_count
+            instance.samples.append(info)
+            self._order.append(info)
+            self._octets += len(change.payload)
+        if not self._has_news:
+            self._has_news = True
+            self._on_news()
+
+    def _revive(self, instance: Instance) -> None:
+        if instance.state is InstanceState.NOT_ALIVE_DISPOSED:
+            instance.disposed_generation_count += 1
+        else:
+            instance.no_writers_generation_count += 1
+        instance.state = _ALIVE
+        instance.view_state = _NEW
+
+    def _limit_reached(self, instance: Instance, octets: int) -> str | None:
+        if self._max_per_instance and len(instance.samples) >= self._max_per_instance:
+            return "max_samples_per_instance"
+        if self._max_samples and len(self) >= self._max_samples:
+            return "max_samples"
+        if self._octets and self._octets + octets > self._max_octets:
+            return "octets of history"
+        return None
+
+    def _no_room(self, limit: str) -> bool:
+        if self._is_reliable:
+            return False
+        self._on_rejected(limit)
+        return True
+
+    def _push_out(self, instance: Instance) -> None:
+        """KEEP_LAST: the oldest sample with data goes.  What tells of an end stays; there is one such at most."""
+        oldest = instance.samples.popleft()
+        self._discard(oldest)
+        self._removed_count += 1
+        if self._removed_count > _COMPACT_ABOVE and self._removed_count * 2 > len(self._order):
+            self._order = deque(info for info in self._order if info._change is not None)
+            self._removed_count = 0
+
+    def _discard(self, info: SampleInfo) -> None:
+        change = info._change
+        assert change is not None
+        self._octets -= len(change.payload)
+        info._change = None
+
+    def _purge(self, instance: Instance) -> None:
+        """Nobody writes it and nothing is left to take: forget it, so that instances come and go without end."""
+        if not instance.samples and not instance.writers and instance.state is not _ALIVE:
+            self._instances.pop(instance.key, None)
+
+    # --- what goes out -----------------------------------------------------------------------------------
+
+    def seen(self) -> None:
+        """The application is about to look: the next sample is news again."""
+        self._has_news = False
+
+    def take_next(self) -> tuple[SampleInfo, CacheChange] | None:
+        """The oldest sample, removed: the short form of :meth:`take` for ``async for``."""
+        order = self._order
+        while order:
+            info = order.popleft()
+            change = info._change
+            if change is None:
+                self._removed_count -= 1
+                continue
+            instance = self._instances[info.instance_handle]
+            instance.samples.remove(info) if instance.samples[0] is not info else instance.samples.popleft()
+            self._octets -= len(change.payload)
+            info.view_state = instance.view_state
+            instance.view_state = _NOT_NEW
+            info.instance_state = instance.state
+            if instance.generation:
+                self._set_generation_ranks([(info, instance)])
+            self._purge(instance)
+            return info, change
+        return None
+
+    def take(
+        self,
+        max_samples: int | None = None,
+        *,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+        instance: bytes | None = None,
+        selector: SampleSelector | None = None,
+    ) -> list[tuple[SampleInfo, CacheChange]]:
+        """Up to ``max_samples`` (all) of the wanted samples, oldest first, removed from the cache."""
+        chosen = self._select(max_samples, sample_states, view_states, instance_states, instance, selector)
+        result = [(info, info._change) for info, _ in chosen]
+        for info, of in chosen:
+            of.samples.remove(info) if of.samples[0] is not info else of.samples.popleft()
+            self._discard(info)
+            self._removed_count += 1
+            self._purge(of)
+        while self._order and self._order[0]._change is None:
+            self._order.popleft()
+            self._removed_count -= 1
+        return [(info, change) for info, change in result if change is not None]
+
+    def read(
+        self,
+        max_samples: int | None = None,
+        *,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+        instance: bytes | None = None,
+        selector: SampleSelector | None = None,
+    ) -> list[tuple[SampleInfo, CacheChange]]:
+        """As :meth:`take`, but the samples stay and count as read.  What is returned is a copy, as of now."""
+        chosen = self._select(max_samples, sample_states, view_states, instance_states, instance, selector)
+        result = [(copy(info), info._change) for info, _ in chosen]
+        for info, _ in chosen:
+            info.sample_state = _READ
+        return [(info, change) for info, change in result if change is not None]
+
+    def matches(self, sample_states: int, view_states: int, instance_states: int, selector: SampleSelector | None) -> bool:
+        """Is there any such sample?"""
+        return bool(self._select(1, sample_states, view_states, instance_states, None, selector, touch=False))
+
+    def _select(
+        self,
+        max_samples: int | None,
+        sample_states: int,
+        view_states: int,
+        instance_states: int,
+        key: bytes | None,
+        selector: SampleSelector | None,
+        *,
+        touch: bool = True,
+    ) -> list[tuple[SampleInfo, Instance]]:
+        source: deque[SampleInfo] = self._order
+        if key is not None:
+            only = self._instances.get(key)
+            source = only.samples if only is not None else deque()
+        chosen: list[tuple[SampleInfo, Instance]] = []
+        for info in source:
+            if max_samples is not None and len(chosen) >= max_samples:
+                break
+            if info._change is None:
+                continue
+            instance = self._instances[info.instance_handle]
+            if (
+                info.sample_state & sample_states
+                and instance.view_state & view_states
+                and instance.state & instance_states
+                and (selector is None or selector(info))
+            ):
+                chosen.append((info, instance))
+        if touch:
+            self._mark_access(chosen)
+        return chosen
+
+    def _mark_access(self, chosen: list[tuple[SampleInfo, Instance]]) -> None:
+        """Fill in what depends on the whole collection.  DDS 1.4 §2.2.2.5.1.5-8 (view state, generations, ranks)."""
+        has_generations = False
+        for info, instance in reversed(chosen):
+            info.sample_rank = instance.rank
+            instance.rank += 1
+            info.view_state = instance.view_state
+            info.instance_state = instance.state
+            has_generations = has_generations or instance.generation > 0
+        for _, instance in chosen:
+            instance.rank = 0
+            instance.view_state = _NOT_NEW
+        if has_generations:
+            self._set_generation_ranks(chosen)
+
+    def _set_generation_ranks(self, chosen: list[tuple[SampleInfo, Instance]]) -> None:
+        latest = {info.instance_handle: _generation(info) for info, _ in chosen}  # the last one of each stays
+        for info, instance in chosen:
+            info.generation_rank = latest[info.instance_handle] - _generation(info)
+            info.absolute_generation_rank = instance.generation - _generation(info)
+
+
+def _generation(info: SampleInfo) -> int:
+    return info.disposed_generation_count + info.no_writers_generation_count

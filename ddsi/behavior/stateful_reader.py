@@ -1,0 +1,238 @@
+"""StatefulReader: a reader that knows its writers, keeps their order and asks for what is missing.
+
+RTPS 2.5 §8.4.12 (RTPS StatefulReader behavior).  What is in order goes into the ``history``: the
+ReaderHistoryCache of an application's reader, or whatever takes a builtin topic's changes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.discovered import DiscoveredWriterData
+from ddsi.structure.guid import Guid
+from ddsi.structure.locator import Locator
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.sequence_number import NumberSet
+
+from .defrag import Defragmenter, PartialSample
+from .transmissions import SendAckNack, SendNackFrag
+from .writer_proxy import WriterProxy
+
+__all__ = ["ChangeSink", "RemoteWriter", "StatefulReader"]
+
+_MAX_NACK_FRAGS_AT_ONCE = 4
+_FRAGMENT_SILENCE_S = 0.002
+
+
+class ChangeSink(Protocol):
+    """Where changes go when their turn has come."""
+
+    def add(self, change: CacheChange, now: float) -> bool:
+        """Take the change; False when there is no room and a reliable writer's must wait (RTPS 2.5 §8.2.10.1)."""
+        ...
+
+
+class RemoteWriter:
+    """A remote writer as the participant sees it: who reads it here, and its fragments.  Other name: proxy_writer."""
+
+    __slots__ = ("data", "defragmenter", "guid", "participant", "readers")
+
+    def __init__(self, data: DiscoveredWriterData, defragmenter: Defragmenter, participant: object = None) -> None:
+        self.data = data
+        self.guid = data.guid
+        self.defragmenter = defragmenter
+        self.participant = participant
+        self.readers: list[tuple[StatefulReader, WriterProxy]] = []
+
+
+class StatefulReader:
+    """One local reader.  All its methods take the proxy they are about; nothing is looked up twice."""
+
+    def __init__(
+        self,
+        guid: Guid,
+        qos: EndpointQos,
+        history: ChangeSink,
+        *,
+        reorder_max_samples: int,
+        reorder_max_octets: int,
+    ) -> None:
+        self.guid = guid
+        self.qos = qos
+        self.history = history
+        self.is_reliable = qos.is_reliable
+        self.writers: dict[Guid, WriterProxy] = {}
+        self._reorder_max_samples = reorder_max_samples
+        self._reorder_max_octets = reorder_max_octets
+
+    def __repr__(self) -> str:
+        return f"<StatefulReader {self.guid}, {len(self.writers)} writers>"
+
+    # --- matching ----------------------------------------------------------------------------------------
+
+    def matched_writer_add(
+        self,
+        data: DiscoveredWriterData,
+        locators: tuple[Locator, ...],
+        now: float,
+        *,
+        uses_filter: bool = False,
+        is_local: bool = False,
+    ) -> WriterProxy:
+        """RTPS 2.5 §8.4.10.3.1.  A reliable pair starts with a preemptive ACKNACK, due now."""
+        proxy = WriterProxy(
+            data,
+            locators,
+            is_reliable=self.is_reliable and data.qos.is_reliable,
+            needs_historical_data=self.qos.is_transient_local and data.qos.is_transient_local,
+            uses_filter=uses_filter,
+            is_local=is_local,
+            max_samples=self._reorder_max_samples,
+            max_octets=self._reorder_max_octets,
+        )
+        if proxy.is_reliable and not is_local:
+            proxy.schedule.matched(now)
+        self.writers[data.guid] = proxy
+        return proxy
+
+    def matched_writer_remove(self, guid: Guid, now: float) -> WriterProxy | None:
+        """RTPS 2.5 §8.4.10.3.3.  What was waiting for a number that will not come any more is delivered before it goes."""
+        proxy = self.writers.pop(guid, None)
+        if proxy is not None and proxy.is_reliable:
+            proxy.reorder.skip_to(proxy.last_seq + 1)
+            self._deliver(proxy, now)
+        return proxy
+
+    # --- what writers send -------------------------------------------------------------------------------
+
+    def receive_data(self, proxy: WriterProxy, change: CacheChange, now: float) -> int:
+        """One whole change: returns how many numbers before it are lost for good (best effort only).
+
+        The first branch is the fast path: it is this number's turn and nothing waits.
+        """
+        number = change.sequence_number
+        reorder = proxy.reorder
+        if number == reorder.next_sn and not reorder and (proxy.is_local or not proxy.schedule.is_preemptive or not proxy.is_reliable):
+            if number > proxy.last_seq:
+                proxy.last_seq = number
+            if self.history.add(change, now):
+                reorder.next_sn = number + 1
+                if not proxy.is_reliable:
+                    return 0
+                if proxy.schedule.due != math.inf:
+                    self._progressed(proxy, now)
+                return 0
+        if proxy.is_reliable:
+            self._receive_reliable(proxy, change, now)
+            return 0
+        return self._receive_best_effort(proxy, change, now)
+
+    def _receive_best_effort(self, proxy: WriterProxy, change: CacheChange, now: float) -> int:
+        """RTPS 2.5 §8.4.12.1: later numbers win, lower ones that come late are dropped.
+
+        The first number received is taken as it is: what came before it was not for us.
+        """
+        number = change.sequence_number
+        if number < proxy.next_sn:
+            return 0
+        lost = number - proxy.next_sn if proxy.last_seq else 0
+        proxy.last_seq = number
+        proxy.reorder.next_sn = number + 1
+        self.history.add(change, now)
+        return lost
+
+    def _receive_reliable(self, proxy: WriterProxy, change: CacheChange, now: float) -> None:
+        number = change.sequence_number
+        if number < proxy.next_sn:
+            return
+        proxy.last_seq = max(proxy.last_seq, number)
+        proxy.reorder.add(change)
+        self._progressed(proxy, now)
+
+    def receive_gap(self, proxy: WriterProxy, start: int, numbers: NumberSet, now: float) -> None:
+        """GAP.  RTPS 2.5 §8.3.8.4, §8.4.12.2.8."""
+        proxy.irrelevant_change_set(start, numbers)
+        self._progressed(proxy, now)
+
+    def receive_heartbeat(
+        self, proxy: WriterProxy, first: int, last: int, count: int, now: float, *, final: bool
+    ) -> int:
+        """HEARTBEAT: returns how many numbers are lost for good.  RTPS 2.5 §8.3.8.6, §8.4.12.2.3."""
+        if not proxy.is_reliable or not proxy.accepts_heartbeat(count, now):
+            return 0
+        lost = proxy.receive_heartbeat(first, last, now, final=final)
+        self._deliver(proxy, now)
+        if proxy.next_sn <= proxy.last_seq:
+            proxy.schedule.missing(now)
+        return lost
+
+    def _progressed(self, proxy: WriterProxy, now: float) -> None:
+        before = proxy.next_sn
+        if not proxy.schedule.is_preemptive or proxy.is_local:
+            self._deliver(proxy, now)
+        if proxy.next_sn != before:
+            proxy.schedule.progress()
+        if not proxy.is_local:
+            proxy.note_missing(now)
+
+    def _deliver(self, proxy: WriterProxy, now: float) -> bool:
+        """Hand over what is in order; stops where the history has no room.  Returns whether anything moved.
+
+        Before the first HEARTBEAT of a reliable writer nothing is: only it tells what comes first.
+        """
+        before = proxy.next_sn
+        while (change := proxy.reorder.head()) is not None:
+            if not self.history.add(change, now):
+                break
+            proxy.reorder.pop_head()
+        return proxy.next_sn != before
+
+    def resume(self, now: float) -> list[WriterProxy]:
+        """The application took samples: deliver what waited for room; returns the proxies whose position moved."""
+        moved = [proxy for proxy in self.writers.values() if proxy.reorder and self._deliver(proxy, now)]
+        for proxy in moved:
+            if not proxy.is_local and proxy.is_reliable:
+                proxy.schedule.acknowledge(now)
+        return moved
+
+    # --- the clock ---------------------------------------------------------------------------------------
+
+    def handle_timeout(
+        self, proxy: WriterProxy, remote: RemoteWriter | None, now: float
+    ) -> list[SendAckNack | SendNackFrag]:
+        """The proxy's schedule is due: an ACKNACK, and NACK_FRAGs for samples that came in part."""
+        schedule = proxy.schedule
+        if schedule.due > now:
+            return []
+        if schedule.is_preemptive:
+            return [proxy.preemptive_acknack(now)]
+        partial = self._partial_samples(proxy, remote)
+        missing = proxy.missing_changes(excluded=partial)
+        out: list[SendAckNack | SendNackFrag] = [proxy.acknack(missing)]
+        for number, sample in sorted(partial.items())[:_MAX_NACK_FRAGS_AT_ONCE]:
+            if now - sample.last_arrival >= _FRAGMENT_SILENCE_S:
+                out.append(proxy.nack_frag(number, sample.missing()))
+        if missing or partial:
+            schedule.nack_sent(now)
+        else:
+            schedule.complete()
+        return out
+
+    def _partial_samples(self, proxy: WriterProxy, remote: RemoteWriter | None) -> dict[int, PartialSample]:
+        """Samples of which fragments are here: asked for by fragment, not as a whole."""
+        if remote is None or not len(remote.defragmenter):
+            return {}
+        partial = remote.defragmenter.partial_for(self.guid.prefix, self.guid.entity_id)
+        return {number: sample for number, sample in partial.items() if proxy.next_sn <= number <= proxy.last_seq}
+
+    def fragment_received(self, proxy: WriterProxy, sequence_number: int, now: float) -> bool:
+        """A fragment of this number came: is the sample wanted at all?  It is known to exist from now on."""
+        if sequence_number < proxy.next_sn:
+            return False
+        if proxy.is_reliable:
+            proxy.last_seq = max(proxy.last_seq, sequence_number - 1)
+            if proxy.schedule.due != math.inf and not proxy.schedule.is_preemptive:
+                proxy.schedule.progress()
+        return True

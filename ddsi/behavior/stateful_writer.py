@@ -1,0 +1,503 @@
+"""StatefulWriter: a writer that knows its readers, and repairs what they miss.
+
+RTPS 2.5 §8.4.9.2 (Reliable StatefulWriter behavior), §8.4.8 (best effort).  It decides what is to be sent and
+answers with transmissions; encoding, packing and sending is the engine's.
+
+Two positions say how far it is.  ``next_unsent_sn``: everything below was sent to all readers that were matched
+then (or, filtered, to those it concerned).  A reader that comes later asks for history like for anything
+else it misses, so there is no second path for late joiners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.discovered import DiscoveredReaderData
+from ddsi.structure.guid import GUID_UNKNOWN, Guid
+from ddsi.structure.locator import Locator
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.sequence_number import NumberSet
+
+from .filtered import directed_heartbeat_range, gap_before, gap_for, is_irrelevant
+from .reader_proxy import ReaderProxy
+from .schedules import HeartbeatSchedule
+from .send_window import SendWindow
+from .transmissions import SendData, SendFragments, SendHeartbeat, WriterTransmission
+from .writer_history_cache import WriterHistoryCache
+
+__all__ = ["StatefulWriter"]
+
+_STALLED_AFTER_S = 0.5
+_PACE_S = 0.001
+_MAX_FILTERED_SAMPLES_PER_READER = 256
+
+
+class StatefulWriter:
+    """One local writer.  ``filters``: its changes have destinations (see :mod:`ddsi.behavior.filtered`)."""
+
+    def __init__(
+        self,
+        guid: Guid,
+        qos: EndpointQos,
+        *,
+        fragment_octets: int,
+        unacknowledged_octets_max: int,
+        filters: bool = False,
+    ) -> None:
+        """``fragment_octets``: payloads larger than this travel in fragments of this size."""
+        self.guid = guid
+        self.qos = qos
+        self.cache = WriterHistoryCache(qos)
+        self.filters = filters
+        self.fragment_octets = fragment_octets
+        self.is_reliable = qos.is_reliable
+        self.readers: dict[Guid, ReaderProxy] = {}
+        self.local_readers: dict[Guid, ReaderProxy] = {}
+        self.locators: tuple[Locator, ...] = ()
+        self.next_unsent_sn = 1
+        self.window = SendWindow()
+        self.heartbeat = HeartbeatSchedule()
+        self._reliable_readers = 0
+        self._unacknowledged_octets_max = unacknowledged_octets_max
+        self._next_unsent_fragment = 1
+        self._pace_due = math.inf
+        self._heartbeat_count = 0
+        # What was sent and not acknowledged by the readers that still answer: (number, octets), ascending.
+        self._in_flight: deque[tuple[int, int]] = deque()
+        self._in_flight_octets = 0
+        self._expiries: deque[tuple[float, int]] = deque()
+
+    def __repr__(self) -> str:
+        return f"<StatefulWriter {self.guid} sent {self.next_unsent_sn - 1} of {self.cache.last_sn}, {len(self.readers)} readers>"
+
+    # --- the application's side --------------------------------------------------------------------------
+
+    def lacks_room(self, octets: int, key: bytes) -> str | None:
+        """Why one more change of so many octets has to wait, in words; None when it has not to."""
+        reason = self.cache.lacks_room(key)
+        if reason is not None:
+            return f"resource limit {reason}"
+        if self.is_reliable and (self._reliable_readers or self.local_readers):
+            waiting = self.cache.unacknowledged_octets
+            if waiting and waiting + octets > self._unacknowledged_octets_max:
+                return f"{waiting} octets are not acknowledged (bound {self._unacknowledged_octets_max})"
+        return None
+
+    def has_overflow(self, destination: Guid) -> bool:
+        """Filtered writers: does this destination hold more unacknowledged samples than one may?"""
+        count = sum(change.destination == destination for change in self.cache.changes())
+        return count >= _MAX_FILTERED_SAMPLES_PER_READER
+
+    def new_change(
+        self,
+        kind: ChangeKind,
+        payload: bytes,
+        key: bytes,
+        source_timestamp: int,
+        now: float,
+        *,
+        key_hash: bytes = b"",
+        destination: Guid = GUID_UNKNOWN,
+        related: tuple[Guid, int] | None = None,
+    ) -> CacheChange:
+        """Add a change to the history; RTPS 2.5 §8.2.7.1 (Writer::new_change).  It is sent by :meth:`unsent_changes`."""
+        cache = self.cache
+        lifespan = self.qos.lifespan.duration
+        change = CacheChange(
+            kind,
+            self.guid,
+            cache.last_sn + 1,
+            payload,
+            key,
+            source_timestamp,
+            key_hash=key_hash,
+            destination=destination,
+            related=related,
+        )
+        cache.add(change)
+        if lifespan != math.inf:
+            change.expiry = now + lifespan
+            self._expiries.append((change.expiry, change.sequence_number))
+        if self._reliable_readers:
+            self.heartbeat.written(now)
+        return change
+
+    def sends_directly(self, change: CacheChange) -> bool:
+        """The fast path: nothing waits before this change, it fits, and it goes to everybody as one DATA.
+
+        Agrees with :meth:`unsent_changes`, which is the general form; marks the change as sent.
+        """
+        sequence_number = change.sequence_number
+        size = len(change.payload)
+        if self.next_unsent_sn != sequence_number or self.filters or size > self.fragment_octets:
+            return False
+        if self._reliable_readers:
+            if self._in_flight_octets >= self.window.octets:
+                return False
+            self._in_flight.append((sequence_number, size))
+            self._in_flight_octets += size
+        self.next_unsent_sn = sequence_number + 1
+        if not self._reliable_readers:
+            self.cache.acknowledged_up_to(self.min_acked_sn())
+        return True
+
+    def min_acked_sn(self) -> int:
+        """All up to here (inclusive) is acknowledged by every matched reliable reader, or was never for it.
+
+        What best-effort readers were not sent yet counts as not acknowledged.
+        """
+        acked = self.next_unsent_sn - 1 if self.readers else self.cache.last_sn
+        for proxies in (self.readers, self.local_readers):
+            for proxy in proxies.values():
+                if proxy.is_reliable and proxy.acked_sn < acked and not (self.filters and proxy.acked_sn >= proxy.lst_seq):
+                    acked = proxy.acked_sn
+        return acked
+
+    # --- matching ----------------------------------------------------------------------------------------
+
+    def matched_reader_add(
+        self, data: DiscoveredReaderData, locators: tuple[Locator, ...], now: float
+    ) -> list[WriterTransmission]:
+        """RTPS 2.5 §8.4.7.3.1.  A reliable reader is told at once what there is, lest it waits or asks."""
+        proxy = ReaderProxy(data, locators, history_sn=self._history_sn_for(data), now=now)
+        proxy.match_sn = self.next_unsent_sn - 1
+        self.readers[data.guid] = proxy
+        self._matched_readers_changed()
+        if not (self.is_reliable and proxy.is_reliable):
+            return []
+        if proxy.acked_sn < self.next_unsent_sn - 1:
+            self.heartbeat.written(now)
+        return [self.directed_heartbeat(proxy)]
+
+    def matched_local_reader_add(self, data: DiscoveredReaderData, now: float) -> ReaderProxy:
+        """A reader of the same participant: it is handed the changes themselves."""
+        proxy = ReaderProxy(data, (), history_sn=self._history_sn_for(data), now=now)
+        self.local_readers[data.guid] = proxy
+        return proxy
+
+    def matched_reader_remove(self, guid: Guid, now: float) -> None:
+        """RTPS 2.5 §8.4.7.3.3.  What only this reader lacked counts as acknowledged from now on."""
+        self.local_readers.pop(guid, None)
+        proxy = self.readers.pop(guid, None)
+        if proxy is not None and self.filters:
+            self._forget_destination(proxy)
+        self._matched_readers_changed()
+        self._acknowledged(now)
+
+    def matched_reader_update(self, guid: Guid, data: DiscoveredReaderData, locators: tuple[Locator, ...]) -> None:
+        """The reader announced itself anew, perhaps from elsewhere."""
+        proxy = self.readers[guid]
+        proxy.data = data
+        proxy.locators = locators
+        self._matched_readers_changed()
+
+    # --- what is new -------------------------------------------------------------------------------------
+
+    def unsent_changes(self, now: float) -> list[WriterTransmission]:
+        """Everything that is to be sent for the first time now, as far as the window allows.
+
+        RTPS 2.5 §8.4.7.5.4 (next_unsent_change), for all readers at once.
+        """
+        out: list[WriterTransmission] = []
+        while self.next_unsent_sn <= self.cache.last_sn:
+            change = self.cache.get(self.next_unsent_sn)
+            if change is None or not self.readers:
+                self._advance_unsent()
+            elif self.filters:
+                out.extend(self._send_to_destinations(change))
+                self._advance_unsent()
+            elif self._window_is_full() or self._pace_due != math.inf:
+                break
+            elif len(change.payload) <= self.fragment_octets:
+                out.append(SendData(change))
+                self._sent(change)
+            else:
+                out.append(self._send_fragments(change, now))
+        return out
+
+    def _send_to_destinations(self, change: CacheChange) -> list[WriterTransmission]:
+        """The filtered path: the sample to each reader it is meant for, after a GAP for what was not."""
+        out: list[WriterTransmission] = []
+        for proxy in self.readers.values():
+            if not proxy.is_relevant(change) or change.sequence_number <= proxy.history_sn:
+                continue
+            gap = gap_before(proxy, change) if proxy.is_reliable else None
+            if gap is not None:
+                out.append(gap)
+            out.extend(self._whole_change(change, proxy))
+            proxy.lst_seq = change.sequence_number
+            out.append(self.directed_heartbeat(proxy))
+        return out
+
+    def _send_fragments(self, change: CacheChange, now: float) -> SendFragments:
+        """The next burst of a large change: as much as the window; the rest follows a moment later.
+
+        No reader acknowledges fragments, so within one sample only pace protects its socket buffer.
+        """
+        first = self._next_unsent_fragment
+        last_of_all = self.fragment_count(change)
+        last = min(first + max(self.window.octets // self.fragment_octets, 1) - 1, last_of_all)
+        if last == last_of_all:
+            self._sent(change)
+        else:
+            self._next_unsent_fragment = last + 1
+            self._pace_due = now + _PACE_S
+        return SendFragments(change, first, last)
+
+    def fragment_count(self, change: CacheChange) -> int:
+        return -(-len(change.payload) // self.fragment_octets)
+
+    def _whole_change(self, change: CacheChange, proxy: ReaderProxy) -> list[WriterTransmission]:
+        if len(change.payload) <= self.fragment_octets:
+            return [SendData(change, proxy)]
+        return [SendFragments(change, 1, self.fragment_count(change), proxy)]
+
+    def _window_is_full(self) -> bool:
+        return self._reliable_readers > 0 and self._in_flight_octets >= self.window.octets
+
+    def _sent(self, change: CacheChange) -> None:
+        if self._reliable_readers:
+            size = len(change.payload)
+            self._in_flight.append((change.sequence_number, size))
+            self._in_flight_octets += size
+        self._advance_unsent()
+
+    def _advance_unsent(self) -> None:
+        self.next_unsent_sn += 1
+        self._next_unsent_fragment = 1
+        if not self._reliable_readers:
+            self.cache.acknowledged_up_to(self.min_acked_sn())
+
+    # --- heartbeats --------------------------------------------------------------------------------------
+
+    def piggyback_heartbeat(self) -> SendHeartbeat | None:
+        """The HEARTBEAT that rides behind fresh samples; it asks for an answer when the window fills up."""
+        if not self._reliable_readers or self.filters:
+            return None
+        final = self._in_flight_octets * 2 < self.window.octets
+        return self._heartbeat(None, final=final)
+
+    def request_acknowledgment(self) -> list[WriterTransmission]:
+        """Somebody waits for acknowledgment: ask all that lack something (final flag clear)."""
+        return self._heartbeats_for(self._lagging_readers())
+
+    def assert_liveliness(self) -> list[WriterTransmission]:
+        """A HEARTBEAT with the liveliness flag to all readers.  RTPS 2.5 §8.4.13.5."""
+        if not self.readers or not self.is_reliable:
+            return []
+        return [self._heartbeat(None, final=True, liveliness=True)]
+
+    def directed_heartbeat(self, proxy: ReaderProxy) -> SendHeartbeat:
+        """A HEARTBEAT to one reader, about what concerns it; final when it has everything."""
+        last_sent = self.cache.last_sn if self.filters else self.next_unsent_sn - 1
+        if not self.filters:
+            proxy.lst_seq = max(proxy.lst_seq, last_sent)
+        first, last = directed_heartbeat_range(self.cache, proxy, last_sent)
+        self._heartbeat_count += 1
+        return SendHeartbeat(first, last, self._heartbeat_count, proxy.acked_sn >= proxy.lst_seq, (proxy,))
+
+    def _heartbeat(
+        self, readers: tuple[ReaderProxy, ...] | None, *, final: bool, liveliness: bool = False
+    ) -> SendHeartbeat:
+        last = self.next_unsent_sn - 1
+        first = min(self.cache.first_sn, last + 1)
+        self._heartbeat_count += 1
+        return SendHeartbeat(first, last, self._heartbeat_count, final, readers, liveliness)
+
+    def _lagging_readers(self) -> list[ReaderProxy]:
+        last_sent = self.next_unsent_sn - 1
+        return [
+            proxy
+            for proxy in self.readers.values()
+            if proxy.is_reliable and proxy.acked_sn < (proxy.lst_seq if self.filters else last_sent)
+        ]
+
+    def _heartbeats_for(self, lagging: list[ReaderProxy]) -> list[WriterTransmission]:
+        if not lagging:
+            return []
+        if self.filters:
+            return [self.directed_heartbeat(proxy) for proxy in lagging]
+        readers = None if len(lagging) == len(self.readers) else tuple(lagging)
+        return [self._heartbeat(readers, final=False)]
+
+    # --- the clock ---------------------------------------------------------------------------------------
+
+    def next_deadline(self) -> float:
+        expiry = self._expiries[0][0] if self._expiries else math.inf
+        return min(self.heartbeat.due, self._pace_due, expiry)
+
+    def handle_timeout(self, now: float) -> list[WriterTransmission]:
+        out: list[WriterTransmission] = []
+        while self._expiries and self._expiries[0][0] <= now:
+            self.cache.remove(self._expiries.popleft()[1])
+        if self._pace_due <= now:
+            self._pace_due = math.inf
+            out.extend(self.unsent_changes(now))
+        if self.heartbeat.due <= now:
+            lagging = self._lagging_readers()
+            if self._mark_stalled(lagging, now):
+                out.extend(self.unsent_changes(now))
+            out.extend(self._heartbeats_for(lagging))
+            if lagging:
+                self.heartbeat.sent(now)
+            else:
+                self.heartbeat.stop()
+        return out
+
+    def _mark_stalled(self, lagging: list[ReaderProxy], now: float) -> bool:
+        """Readers that have not answered for a while no longer hold the window; returns whether that freed it."""
+        newly = [p for p in lagging if not p.is_stalled and now - p.progress_time > _STALLED_AFTER_S and self._window_is_full()]
+        for proxy in newly:
+            proxy.is_stalled = True
+        if newly:
+            self._drain_in_flight()
+        return bool(newly) and not self._window_is_full()
+
+    # --- what readers answer -----------------------------------------------------------------------------
+
+    def receive_acknack(
+        self, proxy: ReaderProxy, requested: NumberSet, count: int, now: float, *, final: bool
+    ) -> list[WriterTransmission]:
+        """ACKNACK: all below ``requested.base`` arrived, the members are missing.  RTPS 2.5 §8.4.9.2, §8.3.8.1."""
+        preemptive = requested.base <= 1 and not requested and not final
+        if preemptive:
+            proxy.accepts_acknack(count, now)
+            if not proxy.accepts_preemptive(now):
+                return []
+        elif not proxy.accepts_acknack(count, now):
+            return []
+        proxy.progress_time = now
+        was_stalled, proxy.is_stalled = proxy.is_stalled, False
+        if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:
+            self._acknowledged(now)
+        out = self._requested_changes(proxy, requested, now) if requested else []
+        if not final or (out and not self.filters):
+            out.append(self.directed_heartbeat(proxy))
+        elif out and proxy.acked_sn < proxy.lst_seq:
+            out.append(self.directed_heartbeat(proxy))
+        if proxy.acked_sn < self.next_unsent_sn - 1 and self.heartbeat.due == math.inf:
+            self.heartbeat.written(now)
+        out.extend(self.unsent_changes(now))
+        return out
+
+    def _requested_changes(self, proxy: ReaderProxy, requested: NumberSet, now: float) -> list[WriterTransmission]:
+        """Send again what is here, and a GAP for what is not.  RTPS 2.5 §8.4.7.5.3, §8.4.9.2.10-12."""
+        end_sn = self.next_unsent_sn
+        budget = max(self.window.octets, self.fragment_octets)
+        irrelevant: list[int] = []
+        out: list[WriterTransmission] = []
+        for number in requested:
+            if number >= end_sn:
+                break
+            change = self.cache.get(number)
+            if change is None or is_irrelevant(self.cache, proxy, number):
+                irrelevant.append(number)
+            elif budget > 0 and proxy.may_resend(number, now):
+                if number > proxy.match_sn:
+                    self.window.lost(now)
+                sent, octets = self._resend(change, proxy, budget)
+                out.extend(sent)
+                budget -= octets
+        gaps: list[WriterTransmission] = list(gap_for(self.cache, proxy, irrelevant, end_sn))
+        return gaps + out
+
+    def _resend(self, change: CacheChange, proxy: ReaderProxy, budget: int) -> tuple[list[WriterTransmission], int]:
+        """One change to one reader, or the beginning of it that fits the budget: a NACK_FRAG asks for the rest."""
+        size = len(change.payload)
+        if size <= self.fragment_octets:
+            return [SendData(change, proxy)], size
+        last = min(max(budget // self.fragment_octets, 1), self.fragment_count(change))
+        return [SendFragments(change, 1, last, proxy)], last * self.fragment_octets
+
+    def receive_nack_frag(
+        self, proxy: ReaderProxy, sequence_number: int, missing: NumberSet, count: int, now: float
+    ) -> list[WriterTransmission]:
+        """NACK_FRAG: some fragments of one change are missing.  RTPS 2.5 §8.3.8.10, §8.4.14.1."""
+        if not proxy.accepts_nack_frag(count):
+            return []
+        proxy.progress_time = now
+        change = self.cache.get(sequence_number)
+        if change is None or is_irrelevant(self.cache, proxy, sequence_number):
+            return list(gap_for(self.cache, proxy, [sequence_number], self.next_unsent_sn))
+        unsent = self._next_unsent_fragment if sequence_number == self.next_unsent_sn else None
+        end = unsent if unsent is not None else self.fragment_count(change) + 1
+        budget = max(self.window.octets // self.fragment_octets, 1)
+        wanted = [number for number in missing if 1 <= number < end][:budget]
+        if not wanted:
+            return []
+        self.window.lost(now)
+        out: list[WriterTransmission] = [SendFragments(change, *run, proxy) for run in _runs(wanted)]
+        out.append(self.directed_heartbeat(proxy))
+        return out
+
+    # --- acknowledged ------------------------------------------------------------------------------------
+
+    def local_reader_progress(self, proxy: ReaderProxy, acked_sn: int, now: float) -> None:
+        """A reader of this participant took what was handed to it."""
+        if proxy.acked_changes_set(acked_sn):
+            self._acknowledged(now)
+
+    def _acknowledged(self, now: float) -> None:
+        """Somebody acknowledged more, or left: free what nobody needs, and let the window slide."""
+        if self.filters:
+            self._free_acknowledged_destinations()
+        else:
+            self.cache.acknowledged_up_to(self.min_acked_sn())
+        self._drain_in_flight()
+        self.heartbeat.progress(now, complete=not self._lagging_readers())
+
+    def _drain_in_flight(self) -> None:
+        acked = min(
+            (
+                proxy.acked_sn
+                for proxy in self.readers.values()
+                if proxy.is_reliable and not proxy.is_stalled and not proxy.is_catching_up
+            ),
+            default=self.cache.last_sn,
+        )
+        freed = 0
+        in_flight = self._in_flight
+        while in_flight and in_flight[0][0] <= acked:
+            freed += in_flight.popleft()[1]
+        self._in_flight_octets -= freed
+        self.window.acknowledged(freed)
+
+    def _free_acknowledged_destinations(self) -> None:
+        """Filtered: a change goes when the readers it is for have it; the others' acknowledgments mean nothing."""
+        for change in self.cache.changes():
+            number = change.sequence_number
+            waiting = any(
+                proxy.is_reliable and number > proxy.acked_sn and proxy.is_relevant(change)
+                for proxy in self.readers.values()
+            )
+            if not waiting and number < self.next_unsent_sn:
+                self.cache.remove(number)
+
+    def _forget_destination(self, proxy: ReaderProxy) -> None:
+        for change in self.cache.changes():
+            if change.destination in (proxy.guid, proxy.participant_guid):
+                self.cache.remove(change.sequence_number)
+
+    def _history_sn_for(self, data: DiscoveredReaderData) -> int:
+        """The highest number that a reader matched now must not get: all so far, unless both sides keep history."""
+        wants_history = data.qos.is_transient_local and data.qos.is_reliable and self.qos.is_transient_local
+        return 0 if wants_history else self.cache.last_sn
+
+    def _matched_readers_changed(self) -> None:
+        self._reliable_readers = sum(proxy.is_reliable for proxy in self.readers.values()) if self.is_reliable else 0
+        self.locators = tuple(dict.fromkeys(locator for proxy in self.readers.values() for locator in proxy.locators))
+
+
+def _runs(numbers: list[int]) -> list[tuple[int, int]]:
+    """Ascending numbers as inclusive runs: [1, 2, 5] gives [(1, 2), (5, 5)]."""
+    runs: list[tuple[int, int]] = []
+    for number in numbers:
+        if runs and runs[-1][1] == number - 1:
+            runs[-1] = (runs[-1][0], number)
+        else:
+            runs.append((number, number))
+    return runs
+
+

@@ -1,0 +1,164 @@
+"""WriterProxy: a local reader's view of one matched writer.  Other names: pwr_rd_match, matched writer.
+
+RTPS 2.5 §8.4.10.4 (RTPS WriterProxy).  It owns what the pair has of its own: the order (ReorderBuffer), what
+is known to exist (``last_seq``), and when to answer.  It answers questions and returns transmissions; it
+neither delivers nor sends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Container
+
+from ddsi.structure.discovered import DiscoveredWriterData
+from ddsi.structure.guid import EntityId, Guid
+from ddsi.structure.locator import Locator
+from ddsi.structure.sequence_number import NumberSet
+from ddsi.structure.vendor import CYCLONE, FAST_DDS, OPENDDS, RTI, RTI_MICRO, TWINOAKS
+
+from .reorder import ReorderBuffer
+from .schedules import AckNackSchedule
+from .transmissions import SendAckNack, SendNackFrag
+
+__all__ = ["WriterProxy"]
+
+_STALE_HEARTBEAT_S = 0.5
+# These call an ACKNACK with base 0 preemptive; to all others base 0 is malformed.
+_BASE_ZERO_VENDORS = frozenset({FAST_DDS, RTI, RTI_MICRO, OPENDDS, TWINOAKS})
+
+
+class WriterProxy:
+    """``last_seq``: the highest number known from this writer, by DATA, GAP or HEARTBEAT.  Reader side only.
+
+    ``uses_filter``: the writer sends each reader its own changes only (the volatile secure endpoint), so
+    numbers skipped by it are normal and the first HEARTBEAT says nothing about what was missed.
+    """
+
+    __slots__ = (
+        "_acknack_count",
+        "_heartbeat_count",
+        "_heartbeat_time",
+        "_nack_frag_count",
+        "data",
+        "guid",
+        "is_alive",
+        "is_local",
+        "is_reliable",
+        "last_seq",
+        "liveliness_due",
+        "locators",
+        "needs_historical_data",
+        "reorder",
+        "schedule",
+        "uses_filter",
+    )
+
+    def __init__(
+        self,
+        data: DiscoveredWriterData,
+        locators: tuple[Locator, ...],
+        *,
+        is_reliable: bool,
+        needs_historical_data: bool = False,
+        uses_filter: bool = False,
+        is_local: bool = False,
+        max_samples: int,
+        max_octets: int,
+    ) -> None:
+        """``is_reliable``: both sides are.  ``needs_historical_data``: both keep history, so it will be sent."""
+        self.data = data
+        self.guid: Guid = data.guid
+        self.locators = locators
+        self.is_reliable = is_reliable
+        self.is_local = is_local
+        self.uses_filter = uses_filter
+        self.needs_historical_data = needs_historical_data and is_reliable
+        self.reorder = ReorderBuffer(max_samples=max_samples, max_octets=max_octets)
+        self.schedule = AckNackSchedule()
+        self.last_seq = 0
+        self.is_alive = True
+        self.liveliness_due = math.inf
+        self._acknack_count = 0
+        self._nack_frag_count = 0
+        self._heartbeat_count = 0
+        self._heartbeat_time = -math.inf
+
+    def __repr__(self) -> str:
+        return f"<WriterProxy {self.guid} next {self.reorder.next_sn} last {self.last_seq}>"
+
+    @property
+    def entity_id(self) -> EntityId:
+        return self.guid.entity_id
+
+    @property
+    def next_sn(self) -> int:
+        return self.reorder.next_sn
+
+    def available_changes_max(self) -> int:
+        """The highest number such that all up to it were delivered or will never come.  RTPS 2.5 §8.4.10.4.3."""
+        return self.reorder.next_sn - 1
+
+    def missing_changes(self, excluded: Container[int] = ()) -> NumberSet:
+        """Changes the writer has and we lack, lowest first; at most 256 (one ACKNACK).  RTPS 2.5 §8.4.10.4.5."""
+        return self.reorder.missing(self.last_seq, excluded)
+
+    def irrelevant_change_set(self, start: int, numbers: NumberSet) -> None:
+        """GAP: [start, base) and the members of the set will never come.  RTPS 2.5 §8.4.10.4.1, §8.3.8.4."""
+        self.reorder.add_irrelevant(start, numbers.base)
+        last = max(start, numbers.base) - 1
+        for number in numbers:
+            self.reorder.add_irrelevant(number, number + 1)
+            last = number
+        self.last_seq = max(self.last_seq, last)
+
+    def accepts_heartbeat(self, count: int, now: float) -> bool:
+        """Is this HEARTBEAT newer than the last one (serial numbers; after half a second any will do)?"""
+        age = ((count - self._heartbeat_count + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+        if age <= 0 and now - self._heartbeat_time < _STALE_HEARTBEAT_S:
+            return False
+        self._heartbeat_count = count
+        self._heartbeat_time = now
+        return True
+
+    def receive_heartbeat(self, first: int, last: int, now: float, *, final: bool) -> int:
+        """The writer has ``first`` to ``last``: returns how many numbers are lost for good.
+
+        RTPS 2.5 §8.4.10.4.2 (lost_changes_update), §8.4.10.4.4 (missing_changes_update), §8.4.12.2.
+        Before anything was received, numbers below ``first`` are no loss: they were never for this reader.
+        """
+        was_first = self.schedule.is_preemptive
+        self.schedule.heartbeat_received()
+        knew_any = self.last_seq > 0 or self.reorder.next_sn > 1
+        lost = self.reorder.skip_to(first)
+        self.last_seq = max(self.last_seq, last)
+        if not final:
+            self.schedule.acknowledge(now)
+        return lost if knew_any and not was_first and not self.uses_filter else 0
+
+    def note_missing(self, now: float) -> None:
+        """Arm the timer if something known to exist has not come."""
+        if self.reorder.next_sn <= self.last_seq:
+            self.schedule.missing(now)
+        elif not self.schedule.is_preemptive and self.schedule.due > now:
+            self.schedule.complete()
+
+    def preemptive_acknack(self, now: float) -> SendAckNack:
+        """Before the first HEARTBEAT: "here I am, what have you?", in the form that the writer's vendor takes.
+
+        Cyclone DDS takes its preemptive path only on count 0 and base 1; some want base 0; the others drop count 0.
+        """
+        self.schedule.preemptive_sent(now)
+        if self.data.vendor_id == CYCLONE:
+            return SendAckNack(NumberSet(1), 0, final=False)
+        self._acknack_count += 1
+        base = 0 if self.data.vendor_id in _BASE_ZERO_VENDORS else 1
+        return SendAckNack(NumberSet(base), self._acknack_count, final=False)
+
+    def acknack(self, missing: NumberSet) -> SendAckNack:
+        """What is here and what is not.  Always final: no HEARTBEAT is wanted in return, but for those asked for data."""
+        self._acknack_count += 1
+        return SendAckNack(missing, self._acknack_count, final=True)
+
+    def nack_frag(self, sequence_number: int, missing: NumberSet) -> SendNackFrag:
+        self._nack_frag_count += 1
+        return SendNackFrag(sequence_number, missing, self._nack_frag_count)
