@@ -6,6 +6,7 @@ What QoS says stands in ``structure``; this room says where, with whom and withi
 from __future__ import annotations
 
 from .config import Config, TraceLevel
+from .environment import load_config
 from .ports import PortMapping
 
-__all__ = ["Config", "PortMapping", "TraceLevel"]
+__all__ = ["Config", "PortMapping", "TraceLevel", "load_config"]

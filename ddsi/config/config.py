@@ -9,13 +9,13 @@ from __future__ import annotations
 import ipaddress
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import dataclass, field, fields
+from typing import Literal, NoReturn, get_args
 
-from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.vendor import OUR_VENDOR_ID, VendorId
 
 from .ports import HIGHEST_PORT, PortMapping
+from .refusal import RefusedSetting
 
 __all__ = ["HIGHEST_PARTICIPANT_INDEX", "Config", "TraceLevel"]
 
@@ -34,7 +34,7 @@ _SMALLEST_MESSAGE = 512
 _LONGEST_TAG = 255
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Config:
     """The settings of a participant.  Sizes are octets, durations seconds; None leaves the choice to the transport.
 
@@ -127,6 +127,12 @@ class Config:
         if not isinstance(self.vendor_id, bytes) or len(self.vendor_id) != 2:
             _refuse("vendor_id", self.vendor_id, "two octets (bytes)")
 
+    def __repr__(self) -> str:
+        """Only what differs from the defaults."""
+        default = Config()
+        changed = [item.name for item in fields(self) if getattr(self, item.name) != getattr(default, item.name)]
+        return f"Config({', '.join(f'{name}={getattr(self, name)!r}' for name in changed)})"
+
     @property
     def announcement_period(self) -> float:
         """Seconds between announcements: ``spdp_interval``, else a fifth of the lease, at least 0.1 and at most 4 s.
@@ -148,8 +154,8 @@ class Config:
         return config_from_uri(text, domain_id=domain_id, environ=environ or {})
 
 
-def _refuse(name: str, value: object, expected: str) -> None:
-    raise ConfigurationError(f"Config.{name} is {value!r}; it must be {expected}")
+def _refuse(name: str, value: object, expected: str) -> NoReturn:
+    raise RefusedSetting(name, value, expected)
 
 
 def _check_text(name: str, value: object) -> None:
@@ -174,7 +180,7 @@ def _check_where(config: Config) -> None:
     _check_texts("peers", config.peers, '("192.168.1.7", "robot.local:7410")')
     for peer in config.peers:
         _check_peer(peer)
-    if config.multicast not in (None, True, False):
+    if not (config.multicast is None or isinstance(config.multicast, bool)):
         _refuse("multicast", config.multicast, "True, False or None")
     if not _is_multicast_group(config.multicast_address):
         _refuse("multicast_address", config.multicast_address, "an IPv4 multicast address, such as '239.255.0.1'")

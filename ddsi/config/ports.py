@@ -10,6 +10,8 @@ from dataclasses import dataclass, fields
 
 from ddsi.structure.errors import ConfigurationError
 
+from .refusal import RefusedSetting
+
 __all__ = ["HIGHEST_PORT", "PortMapping"]
 
 HIGHEST_PORT = 65535
@@ -34,11 +36,9 @@ class PortMapping:
         for item in fields(self):
             value = getattr(self, item.name)
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= HIGHEST_PORT:
-                raise ConfigurationError(
-                    f"ports.{item.name} is {value!r}; it must be a whole number from 0 to {HIGHEST_PORT}"
-                )
+                raise RefusedSetting(f"ports.{item.name}", value, f"a whole number from 0 to {HIGHEST_PORT}")
         if self.base < 1:
-            raise ConfigurationError("ports.base is 0; it must be at least 1, as port 0 means any port")
+            raise RefusedSetting("ports.base", self.base, "at least 1, as port 0 means any port")
 
     def metatraffic_multicast(self, domain_id: int) -> int:
         """The port on which everybody in the domain hears SPDP."""
