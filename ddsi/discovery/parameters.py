@@ -33,8 +33,13 @@ def encode_key(guid: Guid, pid: ParameterId) -> bytes:
     return seal_payload(ParameterList([(pid, guid)]))
 
 
-def decode_key(payload: Octets, pid: ParameterId) -> Guid:
-    """The Guid in the payload of a dispose, by ``pid``, or by KEY_HASH, which is the same for these topics."""
+def decode_key(payload: Octets, pid: ParameterId, *, key_hash: Octets = b"") -> Guid:
+    """The Guid of what a dispose is about: ``pid`` in the payload, else KEY_HASH there, else the inline ``key_hash``.
+
+    Fast DDS disposes without any payload; the key hash of these topics is the Guid itself (RTPS 2.5 §9.6.4.8).
+    """
+    if not payload and key_hash:
+        return Reader(key_hash, little_endian=True).guid()
     values = ParameterValues(open_payload(payload), vendor_id=OUR_VENDOR_ID, protocol_version=PROTOCOL_VERSION)
     if pid not in values and ParameterId.KEY_HASH in values:
         pid = ParameterId.KEY_HASH
