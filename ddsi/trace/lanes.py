@@ -15,6 +15,7 @@ __all__ = ["ASCII", "Lanes", "Stroke"]
 _BAR, _EVENT, _LOST = "│", "●", "✗"
 _LEAVES_RIGHT, _LEAVES_LEFT, _CROSSES = "├", "┤", "┼"
 _HEAD_RIGHT, _HEAD_LEFT = "▶", "◀"
+_STUB_ROOM = 6  # a stub of four characters, and two to keep it off the text
 ASCII = str.maketrans("│●✗├┤┼▶◀─┄…", "|*x||+><-..")
 """For terminals and files that cannot show the others."""
 
@@ -28,18 +29,18 @@ class Stroke(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """``count`` bars, ``pitch`` characters apart (5 at least, or arrows have no room), and as much behind the last."""
+    """``count`` bars, ``pitch`` characters apart (5 at least, or arrows have no room), with room for a stub behind."""
 
     count: int
     pitch: int
 
     @property
     def width(self) -> int:
-        return self.count * self.pitch
+        return (self.count - 1) * self.pitch + _STUB_ROOM if self.count else 0
 
     def head(self, letters: list[str]) -> str:
         """The columns' names above their bars."""
-        return "".join(letter.ljust(self.pitch) for letter in letters)
+        return "".join(letter.ljust(self.pitch) for letter in letters)[: self.width].ljust(self.width)
 
     def bars(self) -> str:
         """Nothing but the bars: for lines that go on with the text of the one before."""

@@ -54,7 +54,7 @@ def message_parts(octets: Octets, describer: Describer, *, receiver: GuidPrefix 
     try:
         message = MessageReceiver(octets)
     except MalformedMessage as error:
-        said = f"{count_text(len(octets), 'octet')} that are no RTPS message: {printable(error.reason)}"
+        said = f"{count_text(len(octets), 'octet')}, {printable(error.reason)}"
         return MessageParts(GuidPrefix.UNKNOWN, [Part(GuidPrefix.UNKNOWN, [said])])
     header = message.header
     describer.names.learn_header(header.guid_prefix, header.vendor_id)

@@ -4,10 +4,10 @@
     B = 01dd0000:00000000:0000000b  ddsi "reader"
 
           time  A         B
-      0.000000  ●         │         wrote Square #2 (24 octets)
-      0.000000  ├┄┄┄┄✗    │         lost (loss): DATA Square #2
-      0.000000  ├────────▶│         HEARTBEAT Square 1..2 count 2
-      0.000500  │◀────────┤         ACKNACK Square base 2 missing {2} count 1
+      0.000000  ●         │     wrote Square #2 (24 octets)
+      0.000000  ├┄┄┄┄✗    │     lost (loss): DATA Square #2
+      0.000000  ├────────▶│     HEARTBEAT Square 1..2 count 2
+      0.000500  │◀────────┤     ACKNACK Square base 2 missing {2} count 1
 
 A pure function of the events.  A message that both its sender and a receiver traced is drawn once per receiver, when
 it arrives; one that nobody here received is drawn when it is sent.  Whole lines are what arrives, dotted ones
@@ -62,8 +62,9 @@ def sequence_diagram(
     all_events = list(events)
     describer = describer or Describer()
     drawn_later = _learn(all_events, describer)
+    origin = all_events[0].now if all_events else None
     diagram = SequenceDiagram(
-        width=width, colour=colour, ascii_only=ascii_only, categories=categories, describer=describer
+        width=width, colour=colour, ascii_only=ascii_only, categories=categories, describer=describer, origin=origin
     )
     yield from diagram.legend()
     for index, event in enumerate(all_events):
@@ -119,7 +120,8 @@ class SequenceDiagram:
     """The diagram line by line, for events as they come.
 
     Whenever a participant turns up that has no column yet, the columns' head is given again.  Sent messages are drawn
-    when they are sent, received ones when they are received: meant for the trace of one participant.
+    when they are sent, received ones when they are received: meant for the trace of one participant.  ``origin`` is
+    the ``now`` from which times are counted, that of the first event if it is not given.
     """
 
     def __init__(
@@ -130,6 +132,7 @@ class SequenceDiagram:
         ascii_only: bool = False,
         categories: Collection[Category] = DEFAULT_CATEGORIES,
         describer: Describer | None = None,
+        origin: float | None = None,
     ) -> None:
         self._width = max(width, _LEAST_WIDTH)
         self._colour = colour
@@ -137,7 +140,7 @@ class SequenceDiagram:
         self._categories = frozenset(categories)
         self._describer = describer or Describer()
         self._names = self._describer.names
-        self._origin: float | None = None
+        self._origin = origin
         self._lanes = Lanes(0, _MAX_PITCH)
         self._columns: dict[GuidPrefix, int] = {}
         self._is_last_shared = False
@@ -170,13 +173,19 @@ class SequenceDiagram:
         rows = self._rows(event)
         if event.CATEGORY not in self._categories:
             return []
-        is_new = any(prefix not in self._columns for row in rows for prefix in (row.sender, *row.receivers))
-        lines = self.legend() if is_new else []
+        lines = self.legend() if any(self._is_new(row) for row in rows) else []
         time = f"{event.now - self._origin:.6f}"
         for row in rows:
             lines += self._laid_out(time, row)
             time = ""
         return lines
+
+    def _is_new(self, row: _Row) -> bool:
+        """Is there someone who has a letter, but no column yet?  (A flood of strangers has neither; see ``Names``.)"""
+        return any(
+            prefix not in self._columns and prefix in self._names.participants
+            for prefix in (row.sender, *row.receivers)
+        )
 
     def _rows(self, event: TraceEvent) -> list[_Row]:
         self._present[event.participant] = None
@@ -239,12 +248,13 @@ class SequenceDiagram:
 
     def _laid_out(self, time: str, row: _Row) -> list[str]:
         """The row as lines: time, lanes, text; what the first has no room for goes on below."""
-        sender = self._columns.get(row.sender, 0)
-        receivers = [self._columns[prefix] for prefix in row.receivers if prefix in self._columns]
+        last = self._lanes.count - 1
+        sender = self._columns.get(row.sender, last)
+        receivers = [self._columns.get(prefix, last) for prefix in row.receivers]
         lanes = self._drawn_lanes(row, sender, receivers)
         colour = _RED if row.alarming else _DIM if row.drawn is _Drawn.EVENT else _COLOURS[sender % len(_COLOURS)]
         text = row.text
-        if self._is_last_shared and self._lanes.count - 1 in (sender, *receivers):
+        if self._is_last_shared and last in (sender, *receivers):
             whom = ",".join(self._names.letter(prefix) for prefix in row.receivers)
             text = f"{self._names.letter(row.sender)}{f' to {whom}' if whom else ''}: {text}"
         room = self._width - _TIME_WIDTH - 2 - self._lanes.width
