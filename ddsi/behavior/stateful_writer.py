@@ -24,7 +24,7 @@ from .filtered import directed_heartbeat_range, gap_before, gap_for, is_irreleva
 from .reader_proxy import ReaderProxy
 from .schedules import HeartbeatSchedule
 from .send_window import SendWindow
-from .transmissions import SendData, SendFragments, SendHeartbeat, WriterTransmission
+from .transmissions import SendData, SendFragments, SendHeartbeat, SendHeartbeatFrag, WriterTransmission
 from .writer_history_cache import WriterHistoryCache
 
 __all__ = ["StatefulWriter"]
@@ -64,6 +64,7 @@ class StatefulWriter:
         self._next_unsent_fragment = 1
         self._pace_due = math.inf
         self._heartbeat_count = 0
+        self._heartbeat_frag_count = 0
         # What was sent and not acknowledged by the readers that still answer: (number, octets), ascending.
         self._in_flight: deque[tuple[int, int]] = deque()
         self._in_flight_octets = 0
@@ -214,7 +215,7 @@ class StatefulWriter:
                 out.append(SendData(change))
                 self._sent(change)
             else:
-                out.append(self._send_fragments(change, now))
+                out.extend(self._send_fragments(change, now))
         return out
 
     def _send_to_destinations(self, change: CacheChange) -> list[WriterTransmission]:
@@ -231,20 +232,25 @@ class StatefulWriter:
             out.append(self.directed_heartbeat(proxy))
         return out
 
-    def _send_fragments(self, change: CacheChange, now: float) -> SendFragments:
+    def _send_fragments(self, change: CacheChange, now: float) -> list[WriterTransmission]:
         """The next burst of a large change: as much as the window; the rest follows a moment later.
 
-        No reader acknowledges fragments, so within one sample only pace protects its socket buffer.
+        No reader acknowledges fragments, so within one sample only pace protects its socket buffer; a
+        HEARTBEAT_FRAG behind each burst lets it ask early for what it missed.
         """
         first = self._next_unsent_fragment
         last_of_all = self.fragment_count(change)
         last = min(first + max(self.window.octets // self.fragment_octets, 1) - 1, last_of_all)
+        out: list[WriterTransmission] = [SendFragments(change, first, last)]
         if last == last_of_all:
             self._sent(change)
-        else:
-            self._next_unsent_fragment = last + 1
-            self._pace_due = now + _PACE_S
-        return SendFragments(change, first, last)
+            return out
+        self._next_unsent_fragment = last + 1
+        self._pace_due = now + _PACE_S
+        if self._reliable_readers:
+            self._heartbeat_frag_count += 1
+            out.append(SendHeartbeatFrag(change, last, self._heartbeat_frag_count))
+        return out
 
     def fragment_count(self, change: CacheChange) -> int:
         return -(-len(change.payload) // self.fragment_octets)

@@ -21,6 +21,7 @@ __all__ = [
     "SendFragments",
     "SendGap",
     "SendHeartbeat",
+    "SendHeartbeatFrag",
     "SendNackFrag",
     "WriterTransmission",
 ]
@@ -68,7 +69,16 @@ class SendHeartbeat:
     liveliness: bool = False
 
 
-WriterTransmission = SendData | SendFragments | SendGap | SendHeartbeat
+@dataclass(frozen=True, slots=True)
+class SendHeartbeatFrag:
+    """Fragments 1 to ``last`` of a change that is still being sent are available.  To all readers."""
+
+    change: CacheChange
+    last: int
+    count: int
+
+
+WriterTransmission = SendData | SendFragments | SendGap | SendHeartbeat | SendHeartbeatFrag
 
 
 @dataclass(frozen=True, slots=True)

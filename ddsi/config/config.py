@@ -99,6 +99,10 @@ class Config:
     unacknowledged_octets: int = 8 * _MIB
     """How much a reliable writer may have sent without acknowledgment before ``write`` waits."""
 
+    reader_octets: int = 64 * _MIB
+    """How much one reader holds that the application has not taken, where KEEP_ALL has no limits of its own; a
+    reliable writer then waits."""
+
     # --- tracing ---
     trace_file: str = ""
     """Where events go, one JSON object a line: a path, ``stdout`` or ``stderr``.  Empty: tracing is off, at no cost."""
@@ -239,7 +243,8 @@ def _check_sizes(config: Config) -> None:
 
 
 def _check_bounds(config: Config) -> None:
-    for name in ("max_participants", "max_endpoints", "max_instances", "max_reorder_samples", "unacknowledged_octets"):
+    for name in ("max_participants", "max_endpoints", "max_instances", "max_reorder_samples", "unacknowledged_octets",
+                 "reader_octets"):
         _check_number(name, getattr(config, name), 1, 0x7FFFFFFF_FFFFFFFF)
     # A DATA_FRAG's sampleSize is an unsigned long (RTPS 2.5 §9.4.5.5).
     _check_number("max_sample_size", config.max_sample_size, 1, 0xFFFFFFFF)

@@ -93,13 +93,18 @@ def read_participant(
         default_multicast=values.locators(_PID.DEFAULT_MULTICAST_LOCATOR, multicast=True),
         builtin_endpoints=BuiltinEndpoints(values.read(_PID.BUILTIN_ENDPOINT_SET, Reader.u32, _DEFAULT_ENDPOINTS)),
         builtin_endpoint_qos=values.read(_PID.BUILTIN_ENDPOINT_QOS, Reader.u32, 0),
-        lease_duration=values.read(_PID.PARTICIPANT_LEASE_DURATION, Reader.duration, _DEFAULT_LEASE),
+        lease_duration=values.read(_PID.PARTICIPANT_LEASE_DURATION, _read_duration, _DEFAULT_LEASE),
         manual_liveliness_count=values.read(_PID.PARTICIPANT_MANUAL_LIVELINESS_COUNT, Reader.i32, 0),
         entity_name=values.read(_PID.ENTITY_NAME, Reader.string, ""),
         user_data=values.read(_PID.USER_DATA, _read_octets, b""),
         properties=values.properties(),
         security_parameters=values.security_parameters(),
     )
+
+
+def _read_duration(reader: Reader) -> float:
+    # Not Reader.duration itself: the reader for old peers has one of its own.
+    return reader.duration()
 
 
 def _read_vendor_id(reader: Reader) -> VendorId:

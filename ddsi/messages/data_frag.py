@@ -89,6 +89,13 @@ class DataFrag:
 
     def encode(self, *, little_endian: bool = True) -> bytes:
         """The octets; ValueError if ``inline_qos`` is in the other byte order."""
+        payload = self.serialized_payload
+        padding = -len(payload) % 4
+        head = self.encode_head(len(payload) + padding, little_endian=little_endian)
+        return b"".join((head, payload, bytes(padding)))
+
+    def encode_head(self, payload_octets: int, *, little_endian: bool = True) -> bytes:
+        """All but the payload, which the caller sends behind it without copying; ``payload_octets`` with padding."""
         flags = LITTLE_ENDIAN if little_endian else 0
         qos = b""
         if self.inline_qos is not None:
@@ -98,12 +105,10 @@ class DataFrag:
             flags |= _KEY
         if self.non_standard_payload:
             flags |= _NON_STANDARD_PAYLOAD
-        payload = self.serialized_payload
-        padding = -len(payload) % 4
         head = _HEAD[little_endian].pack(
             SubmessageKind.DATA_FRAG,
             flags,
-            _HEAD_LENGTH + len(qos) + len(payload) + padding,
+            _HEAD_LENGTH + len(qos) + payload_octets,
             0,
             _OCTETS_TO_INLINE_QOS,
             self.reader_id,
@@ -115,7 +120,7 @@ class DataFrag:
             self.fragment_size,
             self.sample_size,
         )
-        return b"".join((head, qos, payload, bytes(padding)))
+        return head + qos
 
     @classmethod
     def decode(cls, flags: int, body: Octets) -> DataFrag:

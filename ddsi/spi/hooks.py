@@ -34,12 +34,15 @@ __all__ = [
     "HookEffect",
     "LocalParticipant",
     "Octets",
+    "Parts",
     "ProtectedEndpoint",
     "SecurityHooks",
     "SendMessage",
 ]
 
 Octets = bytes | bytearray | memoryview
+Parts = Sequence[Octets]
+"""Octets in several buffers, as they will be given to the socket: nothing is joined that need not be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,12 +178,14 @@ class SecurityHooks(Protocol):
         """Protect a SerializedPayload, or one run of fragments of it (§8.5.1.9.1)."""
         ...
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Octets) -> Octets:
+    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
         """Protect one submessage of a writer or reader; returns the octets to send in its place (§8.5.1.9.2-3)."""
         ...
 
-    def encode_message(self, receivers: Sequence[Guid], message: Octets) -> Octets:
-        """Protect a whole RTPS message, given and returned with its header (§8.5.1.9.4)."""
+    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        """Protect a whole RTPS message, given and returned with its header (§8.5.1.9.4).
+
+        ``receivers`` are endpoints or participants; their participants are meant."""
         ...
 
     # --- transform, inwards ------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from ddsi.structure.cache_change import CacheChange
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import Guid, GuidPrefix
 
-from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, ProtectedEndpoint
+from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, Parts, ProtectedEndpoint
 from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
 
 __all__ = ["PLAINTEXT", "Plaintext"]
@@ -80,10 +80,10 @@ class Plaintext:
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
         return payload
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Octets) -> Octets:
+    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
         return submessage
 
-    def encode_message(self, receivers: Sequence[Guid], message: Octets) -> Octets:
+    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
         return message
 
     def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:

@@ -1,0 +1,82 @@
+"""ParticipantProxy: what we know of one remote participant.  Other name: proxy_participant.
+
+RTPS 2.5 §8.5.3.2, and §8.5.3.3 for its lease.  It also remembers which hosts it really spoke from: nothing is sent to an address
+that a participant merely claims, or a stranger could point our traffic at somebody else (see ``reachable``).
+"""
+
+from __future__ import annotations
+
+import math
+
+from ddsi.structure.discovered import DiscoveredParticipantData
+from ddsi.structure.guid import Guid, GuidPrefix
+from ddsi.structure.locator import Locator, LocatorKind
+from ddsi.structure.vendor import VendorId
+
+__all__ = ["ParticipantProxy"]
+
+_MAX_HOSTS = 8
+
+
+class ParticipantProxy:
+    """``last_heard``: engine time of the last datagram from it, which is all that a lease needs."""
+
+    __slots__ = (
+        "_hosts",
+        "data",
+        "endpoint_count",
+        "guid",
+        "has_lost_liveliness",
+        "is_admitted",
+        "last_heard",
+        "last_manual_assertion",
+        "prefix",
+    )
+
+    def __init__(self, data: DiscoveredParticipantData, now: float) -> None:
+        self.data = data
+        self.guid: Guid = data.guid
+        self.prefix: GuidPrefix = data.guid.prefix
+        self.last_heard = now
+        self.last_manual_assertion = now
+        self.is_admitted = False
+        self.has_lost_liveliness = False
+        self.endpoint_count = 0
+        self._hosts: dict[bytes, None] = {}
+
+    def __repr__(self) -> str:
+        return f"<ParticipantProxy {self.prefix}>"
+
+    @property
+    def vendor_id(self) -> VendorId:
+        return self.data.vendor_id
+
+    @property
+    def lease_due(self) -> float:
+        """When it counts as gone unless something is heard of it."""
+        return self.last_heard + self.data.lease_duration if self.data.lease_duration < math.inf else math.inf
+
+    def heard_from(self, source: Locator) -> bool:
+        """A datagram came from there; returns whether that host is new."""
+        if source.address in self._hosts:
+            return False
+        if len(self._hosts) >= _MAX_HOSTS:
+            del self._hosts[next(iter(self._hosts))]
+        self._hosts[source.address] = None
+        return True
+
+    def reachable(self, locators: tuple[Locator, ...]) -> tuple[Locator, ...]:
+        """The first of the unicast locators that lies on a host which this participant spoke from, or none."""
+        for locator in locators:
+            if locator.address in self._hosts and locator.kind in (LocatorKind.UDPV4, LocatorKind.UDPV6):
+                return (locator,)
+        return ()
+
+    @property
+    def metatraffic(self) -> tuple[Locator, ...]:
+        """Where builtin topics go."""
+        return self.reachable(self.data.metatraffic_unicast or self.data.default_unicast)
+
+    def user_traffic(self, endpoint_unicast: tuple[Locator, ...]) -> tuple[Locator, ...]:
+        """Where an endpoint's data goes: its own locators, else the participant's default ones."""
+        return self.reachable(endpoint_unicast or self.data.default_unicast or self.data.metatraffic_unicast)

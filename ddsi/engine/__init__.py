@@ -1,0 +1,21 @@
+"""The participant as one sans-I/O machine: octets and clock in; datagrams, deadlines and deliveries out."""
+
+from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
+from .local_endpoints import KeyCodec, LocalReader, LocalWriter
+from .participant import Participant, ParticipantSetup, Timer
+
+__all__ = [
+    "Compute",
+    "DataAvailable",
+    "DiscoveryChanged",
+    "Effect",
+    "KeyCodec",
+    "LocalReader",
+    "LocalWriter",
+    "Participant",
+    "ParticipantSetup",
+    "SendDatagram",
+    "StatusChanged",
+    "Timer",
+    "WriterProgress",
+]

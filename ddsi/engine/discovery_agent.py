@@ -1,0 +1,436 @@
+"""DiscoveryAgent: who is there, what endpoints they have, and telling them of ours.
+
+RTPS 2.5 §8.5.3 (SPDP) and §8.5.4 (SEDP).  Everything that strangers fill - participants, their endpoints - has its bound
+here.  A participant is admitted by the hooks before any of its endpoints is matched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ddsi.discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_QOS, BUILTIN_TOPICS, BuiltinTopic
+from ddsi.discovery.parameters import (
+    decode_key,
+    decode_participant,
+    decode_reader,
+    decode_writer,
+    encode_key,
+    encode_participant,
+    encode_reader,
+    encode_writer,
+)
+from ddsi.discovery.participant_proxy import ParticipantProxy
+from ddsi.discovery.spdp import SpdpAnnouncer
+from ddsi.behavior.stateless_writer import StatelessWriter
+from ddsi.messages.data import Data
+from ddsi.serialization.parameter_id import ParameterId
+from ddsi.serialization.parameter_list import MustUnderstandUnknown, ParameterList
+from ddsi.spi import PENDING, Refused
+from ddsi.structure import builtin_entity_ids as ids
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.discovered import (
+    DiscoveredEndpointData,
+    DiscoveredParticipantData,
+    DiscoveredReaderData,
+    DiscoveredWriterData,
+)
+from ddsi.structure.errors import MalformedMessage
+from ddsi.structure.guid import EntityId, Guid
+from ddsi.structure.locator import Locator
+from ddsi.structure.status import SecurityRefused
+from ddsi.trace import events
+from ddsi.trace.reasons import DropReason, LossReason
+
+from .inbound import Incoming
+
+if TYPE_CHECKING:
+    from .participant import Participant
+
+__all__ = ["DiscoveryAgent"]
+
+
+class DiscoveryAgent:
+    """SPDP and SEDP of one participant."""
+
+    def __init__(self, engine: Participant, announce_to: tuple[Locator, ...], data: DiscoveredParticipantData) -> None:
+        self._engine = engine
+        announcement = engine.hooks.announcement()
+        self.data = replace(
+            data,
+            builtin_endpoints=ANNOUNCED_ENDPOINTS | announcement.builtin_endpoints,
+            security_parameters=announcement.parameters,
+        )
+        self._spdp_writer = StatelessWriter(Guid.of(engine.guid.prefix, ids.SPDP_WRITER))
+        self._announcer = SpdpAnnouncer(announce_to, engine.config.announcement_period, engine.random.random)
+        self._ignored: set[Guid] = set()
+        self._disposed_announcements: list[tuple[EntityId, int]] = []
+
+    # --- ourselves ---------------------------------------------------------------------------------------
+
+    def start(self, now: float) -> None:
+        self._spdp_writer.new_change(ChangeKind.ALIVE, encode_participant(self.data), self._engine.wall_ticks())
+        self._announcer.start(now)
+        self._arm()
+
+    def announce_due(self, now: float) -> None:
+        self._send_spdp(tuple(dict.fromkeys([*self._announcer.due_destinations(now), *self._unicast_only()])))
+        self._arm()
+
+    def announce_change(self, data: DiscoveredParticipantData, now: float) -> None:
+        """What we announce of ourselves (user data, locators) is now this."""
+        self.data = replace(
+            data, builtin_endpoints=self.data.builtin_endpoints, security_parameters=self.data.security_parameters
+        )
+        self._spdp_writer.new_change(ChangeKind.ALIVE, encode_participant(self.data), self._engine.wall_ticks())
+        self._announcer.announce_soon(now)
+        self._send_spdp(tuple(locator for proxy in self._engine.participants.values() for locator in proxy.metatraffic))
+        self._arm()
+
+    def say_goodbye(self) -> None:
+        """Dispose ourselves towards everybody; RTPS 2.5 §8.5.3.2.2.  Lost goodbyes are what leases are for."""
+        guid = self._engine.guid
+        change = self._spdp_writer.new_change(
+            ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED,
+            encode_key(guid, ParameterId.PARTICIPANT_GUID),
+            self._engine.wall_ticks(),
+            key_hash=guid,
+        )
+        known = [locator for proxy in self._engine.participants.values() for locator in proxy.metatraffic]
+        destinations = tuple(dict.fromkeys([*self._announcer.destinations, *known]))
+        self._send_spdp(destinations, change)
+
+    def _unicast_only(self) -> list[Locator]:
+        """Participants that our multicast does not reach: they announce no multicast locator, or we do not multicast."""
+        we_multicast = bool(self.data.metatraffic_multicast)
+        return [
+            locator
+            for proxy in self._engine.participants.values()
+            if not (we_multicast and proxy.data.metatraffic_multicast)
+            for locator in proxy.metatraffic
+        ]
+
+    def _send_spdp(self, destinations: tuple[Locator, ...], change: CacheChange | None = None) -> None:
+        change = change or self._spdp_writer.latest
+        if change is None or not destinations:
+            return
+        inline_qos = None
+        if change.kind is not ChangeKind.ALIVE:
+            status = bytes((0, 0, 0, change.kind))
+            inline_qos = ParameterList([(ParameterId.KEY_HASH, change.key_hash), (ParameterId.STATUS_INFO, status)])
+        data = Data(
+            ids.SPDP_READER,
+            ids.SPDP_WRITER,
+            change.sequence_number,
+            inline_qos,
+            change.payload,
+            is_key=change.kind is not ChangeKind.ALIVE,
+        )
+        self._engine.send_spdp(data.encode(), destinations)
+
+    def _arm(self) -> None:
+        self._engine.set_spdp_timer(self._announcer.next_deadline())
+
+    # --- participants ------------------------------------------------------------------------------------
+
+    def receive_spdp(self, incoming: Incoming, change: CacheChange) -> None:
+        """SPDPdiscoveredParticipantData, or the end of a participant."""
+        try:
+            if change.kind is not ChangeKind.ALIVE:
+                guid = decode_key(change.payload, ParameterId.PARTICIPANT_GUID, key_hash=change.key_hash)
+                if guid[:12] == incoming.prefix:
+                    self.participant_lost(guid, LossReason.GOODBYE, incoming.now)
+                return
+            data = decode_participant(
+                change.payload,
+                source_prefix=change.writer_guid.prefix,
+                vendor_id=incoming.vendor_id,
+                protocol_version=incoming.version,
+            )
+        except MalformedMessage as error:
+            is_must = isinstance(error, MustUnderstandUnknown)
+            reason = DropReason.MUST_UNDERSTAND if is_must else DropReason.MALFORMED_DISCOVERY_DATA
+            self._engine.dropped(reason, incoming.source, str(error))
+            return
+        if not data.metatraffic_unicast and not data.default_unicast:
+            data = replace(data, metatraffic_unicast=(incoming.source,))
+        self._participant_announced(incoming, data)
+
+    def _participant_announced(self, incoming: Incoming, data: DiscoveredParticipantData) -> None:
+        engine = self._engine
+        if data.domain_id is not None and data.domain_id != engine.domain_id:
+            engine.dropped(DropReason.WRONG_DOMAIN, incoming.source, f"domain {data.domain_id}")
+        elif data.domain_tag != self.data.domain_tag:
+            engine.dropped(DropReason.DOMAIN_TAG, incoming.source, repr(data.domain_tag))
+        elif data.guid in self._ignored:
+            engine.dropped(DropReason.IGNORED, incoming.source)
+        elif data.guid.prefix in engine.participants:
+            self._participant_announced_again(engine.participants[data.guid.prefix], data, incoming.now)
+        elif len(engine.participants) >= engine.config.max_participants and not self._evict(incoming.now):
+            engine.dropped(DropReason.TABLE_FULL_PARTICIPANTS, incoming.source)
+        else:
+            self._new_participant(incoming, data)
+
+    def _new_participant(self, incoming: Incoming, data: DiscoveredParticipantData) -> None:
+        engine, now = self._engine, incoming.now
+        proxy = engine.participants[data.guid.prefix] = ParticipantProxy(data, now)
+        proxy.heard_from(incoming.source)
+        incoming.participant = proxy
+        engine.set_lease_timer(proxy)
+        if engine.trace is not None:
+            engine.trace(events.ParticipantDiscovered(now, engine.guid.prefix, data.guid, data.vendor_id, data.entity_name, data.lease_duration, data.metatraffic_unicast))
+        # One announcement for one received, so that the newcomer need not wait a period for ours.  A host that is only
+        # announced and has not spoken gets no more than this one (DESIGN: no amplification).
+        greeting = proxy.metatraffic or _first_unicast(data)
+        self._announcer.participant_found(proxy.metatraffic)
+        self._send_spdp(greeting)
+        admission = engine.hooks.remote_participant(data, now)
+        if isinstance(admission, Refused):
+            engine.status(engine.guid, SecurityRefused(remote=data.guid, reason=admission.reason))
+        elif admission is not PENDING:
+            self.participant_admitted(proxy, now)
+        engine.discovery_changed()
+        self._arm()
+
+    def participant_admitted(self, proxy: ParticipantProxy, now: float) -> None:
+        """Security has nothing against it: match the builtin endpoints, by which everything else is learnt."""
+        if proxy.is_admitted:
+            return
+        proxy.is_admitted = True
+        for topic in BUILTIN_TOPICS:
+            if topic.detector in proxy.data.builtin_endpoints:
+                self._match_builtin_reader(topic, proxy, now)
+            if topic.announcer in proxy.data.builtin_endpoints:
+                self._match_builtin_writer(topic, proxy, now)
+
+    def _match_builtin_reader(self, topic: BuiltinTopic, proxy: ParticipantProxy, now: float) -> None:
+        engine = self._engine
+        writer = engine.local_writers[Guid.of(engine.guid.prefix, topic.writer_id)]
+        data = DiscoveredReaderData(
+            guid=Guid.of(proxy.prefix, topic.reader_id),
+            topic_name=topic.name,
+            type_name=topic.name,
+            qos=BUILTIN_QOS,
+            vendor_id=proxy.vendor_id,
+        )
+        transmissions = writer.behavior.matched_reader_add(data, proxy.metatraffic, now)
+        writer.receivers = tuple(writer.behavior.readers)
+        engine.writer_answers(writer, transmissions)
+
+    def _match_builtin_writer(self, topic: BuiltinTopic, proxy: ParticipantProxy, now: float) -> None:
+        engine = self._engine
+        reader = engine.local_readers[Guid.of(engine.guid.prefix, topic.reader_id)]
+        data = DiscoveredWriterData(
+            guid=Guid.of(proxy.prefix, topic.writer_id),
+            topic_name=topic.name,
+            type_name=topic.name,
+            qos=BUILTIN_QOS,
+            vendor_id=proxy.vendor_id,
+        )
+        engine.matchmaker.attach_writer(reader, data, proxy, proxy.metatraffic, now)
+
+    def _participant_announced_again(
+        self, proxy: ParticipantProxy, data: DiscoveredParticipantData, now: float
+    ) -> None:
+        engine = self._engine
+        if data == proxy.data:
+            return
+        before, proxy.data = proxy.data, data
+        engine.set_lease_timer(proxy)
+        if engine.trace is not None:
+            engine.trace(events.ParticipantChanged(now, engine.guid.prefix, data.guid, data.vendor_id, data.entity_name, data.lease_duration, data.metatraffic_unicast))
+        admission = engine.hooks.remote_participant_changed(data, now)
+        if isinstance(admission, Refused):
+            self.participant_lost(data.guid, LossReason.REJECTED_BY_SECURITY, now, admission.reason)
+            return
+        if (before.metatraffic_unicast, before.default_unicast) != (data.metatraffic_unicast, data.default_unicast):
+            engine.host_heard(proxy, now)
+        engine.discovery_changed()
+
+    def participant_lost(self, guid: Guid, reason: LossReason, now: float, detail: str = "") -> None:
+        """It said goodbye, or its lease ran out: nothing of it stays."""
+        engine = self._engine
+        proxy = engine.participants.get(guid[:12])
+        if proxy is None:
+            return
+        for writer_data in engine.known_writers.of_participant(proxy.prefix):
+            self._writer_lost(writer_data.guid, LossReason.PARTICIPANT_LOST, now)
+        for reader_data in engine.known_readers.of_participant(proxy.prefix):
+            self._reader_lost(reader_data.guid, LossReason.PARTICIPANT_LOST, now)
+        for topic in BUILTIN_TOPICS:
+            writer = engine.local_writers[Guid.of(engine.guid.prefix, topic.writer_id)]
+            writer.behavior.matched_reader_remove(Guid.of(proxy.prefix, topic.reader_id), now)
+            writer.receivers = tuple(writer.behavior.readers)
+            reader = engine.local_readers[Guid.of(engine.guid.prefix, topic.reader_id)]
+            engine.matchmaker.detach_writer(reader, Guid.of(proxy.prefix, topic.writer_id), now)
+        del engine.participants[proxy.prefix]
+        engine.cancel_lease_timer(proxy)
+        engine.hooks.remote_participant_lost(proxy.guid)
+        if reason is LossReason.LEASE_EXPIRED:
+            self._announcer.participant_lost(proxy.metatraffic, now)
+            self._arm()
+        if engine.trace is not None:
+            engine.trace(events.ParticipantLost(now, engine.guid.prefix, proxy.guid, reason, detail))
+        engine.discovery_changed()
+
+    def lease_due(self, prefix: bytes, now: float) -> None:
+        proxy = self._engine.participants.get(prefix)
+        if proxy is None:
+            return
+        if proxy.lease_due <= now:
+            self.participant_lost(proxy.guid, LossReason.LEASE_EXPIRED, now)
+        else:
+            self._engine.set_lease_timer(proxy)
+
+    def ignore(self, guid: Guid, now: float) -> None:
+        """Act as if this participant were not there.  DDS 1.4 §2.2.2.2.1.14 (ignore_participant)."""
+        self._ignored.add(guid)
+        self.participant_lost(guid, LossReason.IGNORED, now)
+
+    def _evict(self, now: float) -> bool:
+        """Make room for a newcomer: a participant that has announced no endpoint goes, the longest silent first.
+
+        A flood of invented participants displaces only its own kind.
+        """
+        idle = [proxy for proxy in self._engine.participants.values() if proxy.endpoint_count == 0]
+        if not idle:
+            return False
+        victim = min(idle, key=lambda proxy: proxy.last_heard)
+        if now - victim.last_heard < 1.0:
+            return False
+        self.participant_lost(victim.guid, LossReason.EVICTED, now)
+        return True
+
+    # --- our endpoints -----------------------------------------------------------------------------------
+
+    def announce_writer(self, data: DiscoveredWriterData, now: float) -> None:
+        self._announce(ids.SEDP_PUBLICATIONS_WRITER, data.guid, encode_writer(data), now)
+
+    def announce_reader(self, data: DiscoveredReaderData, now: float) -> None:
+        self._announce(ids.SEDP_SUBSCRIPTIONS_WRITER, data.guid, encode_reader(data), now)
+
+    def announce_writer_gone(self, guid: Guid, now: float) -> None:
+        self._announce_gone(ids.SEDP_PUBLICATIONS_WRITER, guid, now)
+
+    def announce_reader_gone(self, guid: Guid, now: float) -> None:
+        self._announce_gone(ids.SEDP_SUBSCRIPTIONS_WRITER, guid, now)
+
+    def _announce(self, writer_id: EntityId, guid: Guid, payload: bytes, now: float) -> None:
+        self._prune_disposed()
+        self._engine.write_builtin(writer_id, ChangeKind.ALIVE, payload, guid, now)
+
+    def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float) -> None:
+        self._prune_disposed()
+        payload = encode_key(guid, ParameterId.ENDPOINT_GUID)
+        change = self._engine.write_builtin(
+            writer_id, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, payload, guid, now
+        )
+        self._disposed_announcements.append((writer_id, change.sequence_number))
+
+    def _prune_disposed(self) -> None:
+        """Forget "endpoint gone" once all who were told have it: latecomers never knew the endpoint."""
+        waiting = []
+        for writer_id, number in self._disposed_announcements:
+            cache = self._engine.local_writers[Guid.of(self._engine.guid.prefix, writer_id)].behavior.cache
+            if number <= cache.acked_sn:
+                cache.remove(number)
+            else:
+                waiting.append((writer_id, number))
+        self._disposed_announcements = waiting
+
+    # --- their endpoints ---------------------------------------------------------------------------------
+
+    def receive_publication(self, change: CacheChange, now: float) -> None:
+        """DiscoveredWriterData on the builtin topic DCPSPublication, or its end."""
+        try:
+            if change.kind is not ChangeKind.ALIVE:
+                guid = decode_key(change.payload, ParameterId.ENDPOINT_GUID, key_hash=change.key_hash)
+                if guid.prefix == change.writer_guid.prefix:
+                    self._writer_lost(guid, LossReason.GOODBYE, now)
+                return
+            data = decode_writer(change.payload, self._vendor_of(change))
+        except MalformedMessage as error:
+            self._engine.dropped_discovery(change, str(error))
+            return
+        if self._may_enter(change, data.guid, self._engine.known_writers.get(data.guid) is not None):
+            before = self._engine.known_writers.put(data)
+            self._note_endpoint(data, before, now)
+            if before is not None and before.topic_name != data.topic_name:
+                self._engine.matchmaker.remote_writer_gone(before, LossReason.QOS_CHANGED, now)
+            self._engine.matchmaker.remote_writer_appeared(data, now)
+
+    def receive_subscription(self, change: CacheChange, now: float) -> None:
+        """DiscoveredReaderData on the builtin topic DCPSSubscription, or its end."""
+        try:
+            if change.kind is not ChangeKind.ALIVE:
+                guid = decode_key(change.payload, ParameterId.ENDPOINT_GUID, key_hash=change.key_hash)
+                if guid.prefix == change.writer_guid.prefix:
+                    self._reader_lost(guid, LossReason.GOODBYE, now)
+                return
+            data = decode_reader(change.payload, self._vendor_of(change))
+        except MalformedMessage as error:
+            self._engine.dropped_discovery(change, str(error))
+            return
+        if self._may_enter(change, data.guid, self._engine.known_readers.get(data.guid) is not None):
+            before = self._engine.known_readers.put(data)
+            self._note_endpoint(data, before, now)
+            if before is not None and before.topic_name != data.topic_name:
+                self._engine.matchmaker.remote_reader_gone(before, LossReason.QOS_CHANGED, now)
+            self._engine.matchmaker.remote_reader_appeared(data, now)
+
+    def _vendor_of(self, change: CacheChange) -> bytes:
+        proxy = self._engine.participants.get(change.writer_guid.prefix)
+        return proxy.vendor_id if proxy is not None else b"\0\0"
+
+    def _may_enter(self, change: CacheChange, guid: Guid, is_known: bool) -> bool:
+        """A participant announces its own endpoints only, and all of them together have a bound."""
+        engine = self._engine
+        if guid.prefix != change.writer_guid.prefix or guid in self._ignored:
+            return False
+        proxy = engine.participants.get(guid.prefix)
+        if proxy is None:
+            return False
+        if is_known:
+            return True
+        if len(engine.known_writers) + len(engine.known_readers) >= engine.config.max_endpoints:
+            engine.dropped(DropReason.TABLE_FULL_ENDPOINTS, None, str(guid))
+            return False
+        proxy.endpoint_count += 1
+        return True
+
+    def _note_endpoint(self, data: DiscoveredEndpointData, before: DiscoveredEndpointData | None, now: float) -> None:
+        engine = self._engine
+        if engine.trace is not None:
+            kind = events.EndpointDiscovered if before is None else events.EndpointChanged
+            engine.trace(kind(now, engine.guid.prefix, data.guid, data.topic_name, data.type_name))
+        engine.discovery_changed()
+
+    def _writer_lost(self, guid: Guid, reason: LossReason, now: float) -> None:
+        data = self._engine.known_writers.remove(guid)
+        if data is not None:
+            self._endpoint_lost(guid, reason, now)
+            self._engine.matchmaker.remote_writer_gone(data, reason, now)
+
+    def _reader_lost(self, guid: Guid, reason: LossReason, now: float) -> None:
+        data = self._engine.known_readers.remove(guid)
+        if data is not None:
+            self._endpoint_lost(guid, reason, now)
+            self._engine.matchmaker.remote_reader_gone(data, reason, now)
+
+    def _endpoint_lost(self, guid: Guid, reason: LossReason, now: float) -> None:
+        engine = self._engine
+        proxy = engine.participants.get(guid.prefix)
+        if proxy is not None:
+            proxy.endpoint_count -= 1
+        if engine.trace is not None:
+            engine.trace(events.EndpointLost(now, engine.guid.prefix, guid, reason))
+        engine.discovery_changed()
+
+
+def _first_unicast(data: DiscoveredParticipantData) -> tuple[Locator, ...]:
+    for locator in (*data.metatraffic_unicast, *data.default_unicast):
+        if not locator.is_multicast and not locator.is_unspecified:
+            return (locator,)
+    return ()
+
+

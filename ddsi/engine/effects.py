@@ -1,0 +1,63 @@
+"""What the engine asks its shell to do: small frozen values, in the order in which they are to be done.
+
+``DomainEngine.drain_effects`` gives them out; transport and simulation act on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from ddsi.structure.guid import Guid
+from ddsi.structure.locator import Locator
+from ddsi.structure.status import Status
+
+__all__ = ["Compute", "DataAvailable", "DiscoveryChanged", "Effect", "SendDatagram", "StatusChanged", "WriterProgress"]
+
+Octets = bytes | bytearray | memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class SendDatagram:
+    """Send these parts, joined, to each of the locators.  The parts must not be kept: later writes may change them."""
+
+    destinations: tuple[Locator, ...]
+    parts: Sequence[Octets]
+
+
+@dataclass(frozen=True, slots=True)
+class DataAvailable:
+    """A reader has samples to take: wake who waits for it."""
+
+    reader: Guid
+
+
+@dataclass(frozen=True, slots=True)
+class WriterProgress:
+    """A writer was acknowledged, or has room again: wake who waits for it."""
+
+    writer: Guid
+
+
+@dataclass(frozen=True, slots=True)
+class StatusChanged:
+    """A communication status of an entity changed: hand the event to whoever listens."""
+
+    entity: Guid
+    status: Status
+
+
+@dataclass(frozen=True, slots=True)
+class DiscoveryChanged:
+    """The tables of remote participants and endpoints changed: wake who watches them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compute:
+    """Run ``job`` in a worker thread and give its result to ``computed`` with the engine's time."""
+
+    job: Callable[[], object] = field(repr=False)
+    computed: Callable[[object, float], None] = field(repr=False)
+
+
+Effect = SendDatagram | DataAvailable | WriterProgress | StatusChanged | DiscoveryChanged | Compute

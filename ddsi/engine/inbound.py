@@ -1,0 +1,506 @@
+"""Inbound: a datagram becomes changes, gaps, heartbeats and acknowledgments for those they are meant for.
+
+RTPS 2.5 §8.3.4 (The RTPS Message Receiver).  Everything here is hostile until a MAC says otherwise: whatever a parser refuses ends
+the message, is counted, and goes no further.  DATA in its usual form takes a short path (``_data``); all
+else is decoded into the classes of ``messages``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ddsi.behavior.stateful_reader import RemoteWriter
+from ddsi.behavior.writer_proxy import WriterProxy
+from ddsi.discovery.participant_proxy import ParticipantProxy
+from ddsi.messages.acknack import AckNack, NackFrag
+from ddsi.messages.data import Data
+from ddsi.messages.data_frag import DataFrag
+from ddsi.messages.fast import DATA_BODY
+from ddsi.messages.gap import Gap
+from ddsi.messages.heartbeat import Heartbeat, HeartbeatFrag
+from ddsi.messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
+from ddsi.messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages
+from ddsi.serialization.parameter_id import ParameterId
+from ddsi.serialization.parameter_list import MustUnderstandUnknown, ParameterList
+from ddsi.spi import NoKeys, NotForUs, Octets, Outcome, Rejected
+from ddsi.structure.builtin_entity_ids import SPDP_WRITER
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.errors import MalformedMessage, MalformedSample
+from ddsi.structure.guid import Guid, GuidPrefix
+from ddsi.structure.locator import Locator
+from ddsi.structure.sequence_number import NumberSet
+from ddsi.trace.reasons import DropReason
+
+from .local_endpoints import LocalReader
+
+if TYPE_CHECKING:
+    from .participant import Participant
+
+__all__ = ["Inbound", "Incoming"]
+
+_DATA = int(SubmessageKind.DATA)
+_LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
+_UNKNOWN_ID = bytes(4)
+_UNKNOWN_PREFIX = bytes(12)
+
+
+class Incoming:
+    """The receiver's state for one message.  RTPS 2.5 §8.3.4, table 8.12.  Mutable, one per datagram."""
+
+    __slots__ = ("destination", "is_for_us", "now", "participant", "prefix", "protected", "source", "timestamp", "vendor_id", "version")
+
+    def __init__(self, source: Locator, prefix: bytes, vendor_id: bytes, version: tuple[int, int], now: float) -> None:
+        self.source = source
+        self.prefix = prefix
+        self.vendor_id = vendor_id
+        self.version = version
+        self.now = now
+        self.participant: ParticipantProxy | None = None
+        self.timestamp: int | None = None
+        self.destination = _UNKNOWN_PREFIX
+        self.is_for_us = True
+        self.protected = False  # did this submessage come out of a SEC_ envelope?
+
+
+class Inbound:
+    """Parses for one participant; ``engine`` holds the tables that it looks things up in."""
+
+    def __init__(self, engine: Participant) -> None:
+        self._engine = engine
+        self._own_prefix = bytes(engine.guid[:12])
+        self._hooks = engine.hooks
+        self._handlers: dict[int, Callable[[Incoming, RawSubmessage], None]] = {
+            SubmessageKind.DATA: self._general_data,
+            SubmessageKind.DATA_FRAG: self._data_frag,
+            SubmessageKind.HEARTBEAT: self._heartbeat,
+            SubmessageKind.HEARTBEAT_FRAG: self._heartbeat_frag,
+            SubmessageKind.GAP: self._gap,
+            SubmessageKind.ACKNACK: self._acknack,
+            SubmessageKind.NACK_FRAG: self._nack_frag,
+            SubmessageKind.INFO_TS: self._info_timestamp,
+            SubmessageKind.INFO_DST: self._info_destination,
+            SubmessageKind.INFO_SRC: self._info_source,
+        }
+        # INFO_REPLY is not acted upon: answers go to the locators that the participant announced.
+
+    def receive(self, octets: Octets, source: Locator, now: float) -> None:
+        """One datagram.  Raises nothing; what is dropped is counted by reason."""
+        view = memoryview(octets)
+        if len(view) < 20 or bytes(view[:4]) != b"RTPS":
+            self._engine.dropped(DropReason.NOT_RTPS, source)
+            return
+        if view[4] != 2:
+            self._engine.dropped(DropReason.UNSUPPORTED_VERSION, source)
+            return
+        prefix = bytes(view[8:20])
+        if prefix == self._own_prefix:
+            self._engine.dropped(DropReason.OWN_MESSAGE, source)
+            return
+        incoming = Incoming(source, prefix, bytes(view[6:8]), (2, view[5]), now)
+        self._identify(incoming)
+        try:
+            self._message(incoming, view)
+        except MalformedMessage as error:
+            reason = DropReason.MUST_UNDERSTAND if isinstance(error, MustUnderstandUnknown) else DropReason.MALFORMED_MESSAGE
+            self._engine.dropped(reason, source, str(error))
+
+    def _identify(self, incoming: Incoming) -> None:
+        """Whoever spoke is alive: any datagram renews its lease (RTPS 2.5 §8.5.3.3.2 asks for SPDP alone; all stacks do this)."""
+        participant = self._engine.participants.get(incoming.prefix)
+        incoming.participant = participant
+        if participant is not None:
+            participant.last_heard = incoming.now
+            if participant.heard_from(incoming.source):
+                self._engine.host_heard(participant, incoming.now)
+            if participant.has_lost_liveliness:
+                self._engine.liveliness.revive(participant, incoming.now)
+
+    def _message(self, incoming: Incoming, view: memoryview) -> None:
+        if len(view) >= 24 and view[20] == SubmessageKind.SRTPS_PREFIX:
+            decoded = self._hooks.decode_message(view, GuidPrefix(incoming.prefix))
+            if isinstance(decoded, Outcome):
+                self._undecodable(incoming, decoded)
+                return
+            view = memoryview(decoded)
+        elif not self._hooks.admits_clear_message(incoming.prefix):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        self._submessages(incoming, view, 20)
+
+    def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
+        handlers = self._handlers
+        envelope_start = -1
+        for raw in iterate_submessages(view, start=start):
+            kind = raw.kind
+            if envelope_start >= 0:
+                if kind == SubmessageKind.SEC_POSTFIX:
+                    self._envelope(incoming, view[envelope_start : raw.end])
+                    envelope_start = -1
+            elif kind == _DATA and raw.flags == _LE_DATA_ONLY:
+                if incoming.is_for_us:
+                    self._data(incoming, raw.body)
+            elif kind == SubmessageKind.SEC_PREFIX:
+                envelope_start = raw.offset
+            else:
+                handler = handlers.get(kind)
+                if handler is not None:  # unknown and vendors' own kinds are skipped (RTPS 2.5 §8.3.4.1)
+                    handler(incoming, raw)
+
+    def _envelope(self, incoming: Incoming, octets: memoryview) -> None:
+        """SEC_PREFIX to SEC_POSTFIX: whose it is, is told by INFO_DST before anything is decrypted."""
+        if not incoming.is_for_us:
+            return
+        decoded = self._hooks.decode_submessage(octets, GuidPrefix(incoming.prefix))
+        if isinstance(decoded, Outcome):
+            self._undecodable(incoming, decoded)
+            return
+        incoming.protected = True
+        try:
+            self._submessages(incoming, memoryview(decoded), 0)
+        finally:
+            incoming.protected = False
+
+    def _undecodable(self, incoming: Incoming, outcome: Outcome) -> None:
+        match outcome:
+            case NotForUs():
+                self._engine.dropped(DropReason.NOT_FOR_US, incoming.source)
+            case NoKeys(key_id):
+                self._engine.dropped(DropReason.NO_KEYS, incoming.source, key_id.hex())
+            case Rejected(reason):
+                self._engine.dropped(DropReason.REJECTED_BY_SECURITY, incoming.source, reason)
+
+    # --- the receiver's state ----------------------------------------------------------------------------
+
+    def _info_timestamp(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        incoming.timestamp = InfoTimestamp.decode(raw.flags, raw.body).timestamp
+
+    def _info_destination(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        prefix = bytes(InfoDestination.decode(raw.flags, raw.body).guid_prefix)
+        incoming.destination = prefix
+        incoming.is_for_us = prefix in (self._own_prefix, _UNKNOWN_PREFIX)
+
+    def _info_source(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        info = InfoSource.decode(raw.flags, raw.body)
+        incoming.prefix = bytes(info.guid_prefix)
+        incoming.vendor_id = info.vendor_id
+        incoming.version = info.protocol_version
+        incoming.timestamp = None
+        incoming.participant = self._engine.participants.get(incoming.prefix)
+
+    # --- DATA --------------------------------------------------------------------------------------------
+
+    def _data(self, incoming: Incoming, body: memoryview) -> None:
+        """A sample in its usual form.  The general form is :meth:`_general_data`; both end in :meth:`_change`."""
+        if len(body) < 24:
+            raise MalformedMessage("a DATA without room for its payload", element="DATA")
+        _, to_inline_qos, reader_id, writer_id, high, low = DATA_BODY.unpack_from(body)
+        number = high << 32 | low
+        if number < 1 or to_inline_qos < 16 or to_inline_qos & 3 or len(body) < 8 + to_inline_qos:
+            raise MalformedMessage(f"number {number}, octetsToInlineQos {to_inline_qos}", element="DATA")
+        remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
+        if remote is None:
+            self._from_unmatched(incoming, writer_id, reader_id, number, body[4 + to_inline_qos :])
+            return
+        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        payload = self._hooks.decode_payload(remote.guid, body[4 + to_inline_qos :])
+        if isinstance(payload, Outcome):
+            self._undecodable(incoming, payload)
+            return
+        timestamp = incoming.timestamp
+        change = CacheChange(
+            ChangeKind.ALIVE,
+            remote.guid,
+            number,
+            bytes(payload),
+            b"",
+            timestamp if timestamp is not None else self._engine.reception_ticks(incoming.now),
+        )
+        self._change(incoming, remote, reader_id, change)
+
+    def _general_data(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        if not incoming.is_for_us:
+            return
+        data = Data.decode(raw.flags, raw.body)
+        inline = _InlineQos.read(data.inline_qos)
+        remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
+        if remote is None:
+            self._from_unmatched(
+                incoming, data.writer_id, data.reader_id, data.writer_sn, data.serialized_payload, inline
+            )
+            return
+        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        payload: Octets | Outcome = data.serialized_payload
+        if len(data.serialized_payload):
+            payload = self._hooks.decode_payload(remote.guid, data.serialized_payload)
+        if isinstance(payload, Outcome):
+            self._undecodable(incoming, payload)
+            return
+        self._joined(incoming, remote, data.reader_id, data.writer_sn, bytes(payload), inline, is_key=data.is_key)
+
+    def _joined(
+        self,
+        incoming: Incoming,
+        remote: RemoteWriter,
+        reader_id: bytes,
+        number: int,
+        payload: bytes | bytearray,
+        inline: _InlineQos,
+        *,
+        is_key: bool,
+    ) -> None:
+        """A whole change with what stood beside it: which end of an instance, if any, is it?"""
+        kind = ChangeKind(inline.status & 3) if is_key or not len(payload) else ChangeKind.ALIVE
+        if kind is ChangeKind.ALIVE and (is_key or not len(payload)):
+            self._nothing(incoming, remote, reader_id, number)
+            return
+        timestamp = incoming.timestamp
+        change = CacheChange(
+            kind,
+            remote.guid,
+            number,
+            payload,
+            b"",
+            timestamp if timestamp is not None else self._engine.reception_ticks(incoming.now),
+            key_hash=inline.key_hash,
+            related=inline.related,
+        )
+        self._change(incoming, remote, reader_id, change)
+
+    def _nothing(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, number: int) -> None:
+        """A change that says nothing to us: filtered out by the writer, or a marker.  Its number counts as received."""
+        for reader, proxy in remote.readers:
+            if reader_id in (_UNKNOWN_ID, reader.guid[12:]):
+                reader.receive_gap(proxy, number, NumberSet(number + 1), incoming.now)
+                self._engine.proxy_touched(reader, proxy)
+
+    def _change(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, change: CacheChange) -> None:
+        """To every matched reader that it is addressed to."""
+        now = incoming.now
+        for reader, proxy in remote.readers:
+            if reader_id != _UNKNOWN_ID and reader_id != reader.guid[12:]:
+                continue
+            local = self._engine.local_readers[reader.guid]
+            if local.keys is not None:
+                key = self._key(incoming, local, change)
+                if key is None:
+                    self._nothing(incoming, remote, reader.guid[12:], change.sequence_number)
+                    continue
+                change.key = key
+            due = proxy.schedule.due
+            lost = reader.receive_data(proxy, change, now)
+            if proxy.schedule.due != due:
+                self._engine.proxy_touched(reader, proxy)
+            if lost:
+                self._engine.samples_lost(local, proxy, lost, change.sequence_number - lost, "best effort")
+        if remote.asserts_by_data:
+            self._engine.liveliness.writer_asserted(remote.guid, now)
+        if remote.defragmenter and not remote.data.qos.is_reliable:
+            remote.defragmenter.notice_number(change.sequence_number)
+
+    def _key(self, incoming: Incoming, local: LocalReader, change: CacheChange) -> bytes | None:
+        """The instance's key; None (and counted) when the octets do not hold one."""
+        try:
+            key = local.key_of(change)
+        except MalformedSample as error:
+            self._engine.sample_malformed(local, change, str(error))
+            return None
+        return key
+
+    def _from_unmatched(
+        self,
+        incoming: Incoming,
+        writer_id: bytes,
+        reader_id: bytes,
+        number: int,
+        payload: Octets,
+        inline: _InlineQos | None = None,
+    ) -> None:
+        """DATA of a writer that no reader here is matched with.  SPDP is the one that is expected."""
+        if writer_id == SPDP_WRITER:
+            change = CacheChange(
+                ChangeKind((inline.status & 3) if inline is not None else 0),
+                Guid(incoming.prefix + writer_id),
+                number,
+                bytes(payload),
+                key_hash=inline.key_hash if inline is not None else b"",
+            )
+            self._engine.discovery.receive_spdp(incoming, change)
+            return
+        reason = DropReason.UNKNOWN_PARTICIPANT if incoming.participant is None else DropReason.UNMATCHED
+        self._engine.dropped(reason, incoming.source)
+
+    def _data_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        """One run of fragments: decoded and joined once, whoever reads it."""
+        if not incoming.is_for_us:
+            return
+        data = DataFrag.decode(raw.flags, raw.body)
+        remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
+        if remote is None:
+            self._engine.dropped(DropReason.UNMATCHED, incoming.source)
+            return
+        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        if data.sample_size > self._engine.config.max_sample_size:
+            self._engine.dropped(DropReason.SAMPLE_TOO_LARGE, incoming.source, f"{data.sample_size} octets")
+            return
+        if not self._is_wanted(incoming, remote, data):
+            return
+        fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload)
+        if isinstance(fragments, Outcome):
+            self._undecodable(incoming, fragments)
+            return
+        self._add_fragments(incoming, remote, data, memoryview(fragments))
+
+    def _is_wanted(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag) -> bool:
+        return any(
+            [
+                reader.fragment_received(proxy, data.writer_sn, incoming.now)
+                for reader, proxy in remote.readers
+                if data.reader_id in (_UNKNOWN_ID, reader.guid[12:])
+            ]
+        )
+
+    def _add_fragments(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, fragments: memoryview) -> None:
+        if len(fragments) < data.run_length:
+            raise MalformedMessage(f"{len(fragments)} octets of {data.run_length}", element="DATA_FRAG")
+        defragmenter = remote.defragmenter
+        key = (incoming.destination, bytes(data.reader_id), data.writer_sn)
+        dropped = defragmenter.dropped
+        sample = defragmenter.add(
+            key,
+            sample_size=data.sample_size,
+            fragment_size=data.fragment_size,
+            first=data.fragment_starting_num,
+            count=data.fragments_in_submessage,
+            fragments=fragments,
+            now=incoming.now,
+        )
+        held = sample or defragmenter.partial(key)
+        if held is not None and (data.inline_qos is not None or held.timestamp is None):
+            # Cyclone DDS sends inline QoS with the first fragment only, which may come last.
+            held.inline_qos = data.inline_qos or held.inline_qos
+            held.timestamp = incoming.timestamp
+        if defragmenter.dropped != dropped:
+            self._engine.dropped(DropReason.TABLE_FULL_FRAGMENTS, incoming.source)
+        if sample is not None:
+            incoming.timestamp = sample.timestamp
+            inline = _InlineQos.read(sample.inline_qos)
+            self._joined(
+                incoming, remote, data.reader_id, data.writer_sn, sample.octets, inline, is_key=data.is_key
+            )
+
+    # --- HEARTBEAT, GAP ----------------------------------------------------------------------------------
+
+    def _pairs(self, incoming: Incoming, writer_id: bytes, reader_id: bytes) -> list[tuple[LocalReader, WriterProxy]]:
+        """The local readers that are matched with this writer and meant by the submessage."""
+        if not incoming.is_for_us:
+            return []
+        remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
+        if remote is None:
+            self._engine.dropped(DropReason.UNMATCHED, incoming.source)
+            return []
+        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return []
+        return [
+            (self._engine.local_readers[reader.guid], proxy)
+            for reader, proxy in remote.readers
+            if reader_id in (_UNKNOWN_ID, reader.guid[12:])
+        ]
+
+    def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        heartbeat = Heartbeat.decode(raw.flags, raw.body)
+        for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
+            lost = local.behavior.receive_heartbeat(
+                proxy, heartbeat.first_sn, heartbeat.last_sn, heartbeat.count, incoming.now, final=heartbeat.final
+            )
+            if lost:
+                self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, "no longer available")
+            self._engine.proxy_touched(local.behavior, proxy)
+        if heartbeat.liveliness and incoming.is_for_us:
+            self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
+
+    def _heartbeat_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        """RTPS 2.5 §8.3.8.7: ask at once for fragments that should be here.  Ignored for samples of which none is."""
+        heartbeat = HeartbeatFrag.decode(raw.flags, raw.body)
+        for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
+            if proxy.is_reliable and heartbeat.writer_sn >= proxy.next_sn:
+                self._engine.fragments_announced(local, proxy, heartbeat.writer_sn, heartbeat.last_fragment_num)
+
+    def _gap(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        gap = Gap.decode(raw.flags, raw.body)
+        for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
+            local.behavior.receive_gap(proxy, gap.gap_start, gap.gap_list, incoming.now)
+            self._engine.proxy_touched(local.behavior, proxy)
+
+    # --- ACKNACK -----------------------------------------------------------------------------------------
+
+    def _acknack(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        acknack = AckNack.decode(raw.flags, raw.body)
+        if not incoming.is_for_us:
+            return
+        writer = self._engine.local_writers.get(Guid(self._own_prefix + acknack.writer_id))
+        reader_guid = Guid(incoming.prefix + acknack.reader_id)
+        proxy = writer.behavior.readers.get(reader_guid) if writer is not None else None
+        if writer is None or proxy is None:
+            self._engine.dropped(DropReason.UNKNOWN_READER, incoming.source)
+            return
+        if not incoming.protected and not self._hooks.admits_clear_submessage(reader_guid):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        answers = writer.behavior.receive_acknack(
+            proxy, acknack.reader_sn_state, acknack.count, incoming.now, final=acknack.final
+        )
+        self._engine.writer_answers(writer, answers)
+
+    def _nack_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
+        nack = NackFrag.decode(raw.flags, raw.body)
+        if not incoming.is_for_us:
+            return
+        writer = self._engine.local_writers.get(Guid(self._own_prefix + nack.writer_id))
+        reader_guid = Guid(incoming.prefix + nack.reader_id)
+        proxy = writer.behavior.readers.get(reader_guid) if writer is not None else None
+        if writer is None or proxy is None:
+            self._engine.dropped(DropReason.UNKNOWN_READER, incoming.source)
+            return
+        if not incoming.protected and not self._hooks.admits_clear_submessage(reader_guid):
+            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        answers = writer.behavior.receive_nack_frag(
+            proxy, nack.writer_sn, nack.fragment_number_state, nack.count, incoming.now
+        )
+        self._engine.writer_answers(writer, answers)
+
+
+class _InlineQos:
+    """What a DATA's inline QoS says that concerns receiving it.  RTPS 2.5 §8.7, §9.6.4."""
+
+    __slots__ = ("key_hash", "related", "status")
+
+    def __init__(self, status: int = 0, key_hash: bytes = b"", related: tuple[Guid, int] | None = None) -> None:
+        self.status = status
+        self.key_hash = key_hash
+        self.related = related
+
+    @classmethod
+    def read(cls, parameters: object) -> _InlineQos:
+        """Unknown parameters are skipped, but one that must be understood makes the sample void (RTPS 2.5 §9.6.3)."""
+        if not isinstance(parameters, ParameterList):
+            return _NO_INLINE_QOS
+        parameters.require_understood()
+        status = parameters.get(ParameterId.STATUS_INFO)
+        key_hash = parameters.get(ParameterId.KEY_HASH)
+        return cls(
+            status[3] if status is not None and len(status) >= 4 else 0,
+            bytes(key_hash[:16]) if key_hash is not None and len(key_hash) >= 16 else b"",
+        )
+
+
+_NO_INLINE_QOS = _InlineQos()
+

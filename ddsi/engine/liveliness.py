@@ -1,0 +1,193 @@
+"""Liveliness: saying that our writers are alive, and noticing when others' are not.
+
+DDS 1.4 §2.2.3.11 (LIVELINESS), RTPS 2.5 §8.4.13 (Writer Liveliness Protocol).  Automatic writers live as long as their
+participant speaks, so one ParticipantMessage serves all of them; manual ones are asserted by the application.
+Deadlines are checked when they are due, never per datagram.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ddsi.behavior.stateful_reader import RemoteWriter
+from ddsi.discovery.participant_message import ParticipantMessageData
+from ddsi.discovery.participant_proxy import ParticipantProxy
+from ddsi.structure.builtin_entity_ids import PARTICIPANT_MESSAGE_WRITER
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.discovered import DiscoveredWriterData
+from ddsi.structure.errors import MalformedMessage
+from ddsi.structure.guid import Guid
+from ddsi.structure.qos_policies import Automatic, ManualByParticipant, ManualByTopic
+from ddsi.trace import events
+
+from .local_endpoints import LocalWriter
+
+if TYPE_CHECKING:
+    from .participant import Participant
+
+__all__ = ["Liveliness"]
+
+AUTOMATIC_KIND = b"\x00\x00\x00\x01"
+MANUAL_BY_PARTICIPANT_KIND = b"\x00\x00\x00\x02"
+
+
+class Liveliness:
+    """Both directions for one participant."""
+
+    def __init__(self, engine: Participant) -> None:
+        self._engine = engine
+        self._asserted: dict[Guid, float] = {}  # remote manual-by-topic writers: when last
+
+    # --- our writers -------------------------------------------------------------------------------------
+
+    def writer_added(self, writer: LocalWriter, now: float) -> None:
+        policy = writer.data.qos.liveliness
+        if policy.lease_duration == math.inf:
+            return
+        if isinstance(policy, Automatic):
+            self._engine.set_assertion_timer(now)
+        else:
+            writer.assertion_due = now + policy.lease_duration
+            self._engine.set_writer_liveliness_timer(writer)
+
+    def assertion_period(self) -> float:
+        """Seconds between automatic assertions: 80 % of the shortest lease below 10 s, else 2 s before its end."""
+        leases = [
+            writer.data.qos.liveliness.lease_duration
+            for writer in self._engine.user_writers()
+            if isinstance(writer.data.qos.liveliness, Automatic)
+        ]
+        shortest = min(leases, default=math.inf)
+        return shortest * 0.8 if shortest < 10 else shortest - 2
+
+    def assert_automatic(self, now: float) -> None:
+        self._send(AUTOMATIC_KIND, now)
+
+    def assert_participant(self, now: float) -> None:
+        """The application says that its manual-by-participant writers are alive."""
+        self._send(MANUAL_BY_PARTICIPANT_KIND, now)
+        for writer in self._engine.user_writers():
+            self._renew(writer, now, ManualByParticipant)
+
+    def assert_writer(self, writer: LocalWriter, now: float) -> None:
+        """The application says that this writer is alive, by a call or by writing."""
+        policy = writer.data.qos.liveliness
+        if isinstance(policy, ManualByParticipant):
+            self.assert_participant(now)
+        elif isinstance(policy, ManualByTopic):
+            self._renew(writer, now, ManualByTopic)
+            self._engine.writer_answers(writer, writer.behavior.assert_liveliness())
+
+    def written(self, writer: LocalWriter, now: float) -> None:
+        """A sample was written; DDS 1.4 §2.2.3.11: that asserts too.  Readers see it by the DATA itself."""
+        policy = writer.data.qos.liveliness
+        if isinstance(policy, ManualByTopic):
+            self._renew(writer, now, ManualByTopic)
+        elif isinstance(policy, ManualByParticipant) and now > writer.assertion_due - policy.lease_duration * 0.9:
+            self.assert_participant(now)
+
+    def _renew(self, writer: LocalWriter, now: float, kind: type) -> None:
+        policy = writer.data.qos.liveliness
+        if isinstance(policy, kind) and policy.lease_duration < math.inf:
+            writer.assertion_due = now + policy.lease_duration
+            self._engine.set_writer_liveliness_timer(writer)
+
+    def writer_due(self, writer: LocalWriter, now: float) -> None:
+        """Not asserted in time: the application is told, once."""
+        if writer.assertion_due <= now:
+            writer.assertion_due = math.inf
+            self._engine.status(writer.guid, writer.liveliness_lost())
+
+    def _send(self, kind: bytes, now: float) -> None:
+        message = ParticipantMessageData(self._engine.guid.prefix, kind, b"\0")
+        self._engine.write_builtin(PARTICIPANT_MESSAGE_WRITER, ChangeKind.ALIVE, message.encode(), message.key, now)
+
+    # --- others' writers ---------------------------------------------------------------------------------
+
+    def receive_participant_message(self, change: CacheChange, now: float) -> None:
+        """An assertion of another participant.  RTPS 2.5 §8.4.13.5 (ParticipantMessageData)."""
+        if change.kind is not ChangeKind.ALIVE:
+            return
+        try:
+            message = ParticipantMessageData.decode(change.payload)
+        except MalformedMessage as error:
+            self._engine.dropped_discovery(change, str(error))
+            return
+        participant = self._engine.participants.get(message.prefix)
+        if participant is None or message.prefix != change.writer_guid.prefix:
+            return
+        if message.kind == MANUAL_BY_PARTICIPANT_KIND:
+            participant.last_manual_assertion = now
+        if participant.has_lost_liveliness:
+            self.revive(participant, now)
+
+    def remote_writer_matched(self, data: DiscoveredWriterData, now: float) -> None:
+        if data.qos.liveliness.lease_duration < math.inf:
+            self._asserted.setdefault(data.guid, now)
+            self._engine.set_remote_liveliness_timer(data.guid, now + data.qos.liveliness.lease_duration)
+
+    def remote_writer_gone(self, guid: Guid) -> None:
+        self._asserted.pop(guid, None)
+        self._engine.set_remote_liveliness_timer(guid, math.inf)
+
+    def writer_asserted(self, guid: Guid, now: float) -> None:
+        """A HEARTBEAT with the liveliness flag, or DATA, of a manual-by-topic writer."""
+        if guid in self._asserted:
+            self._asserted[guid] = now
+            remote = self._engine.remote_writers.get(guid)
+            if remote is not None:
+                self._set_alive(remote, now, alive=True)
+
+    def remote_writer_due(self, guid: Guid, now: float) -> None:
+        """Its lease may have ended: look when it was last heard of."""
+        remote = self._engine.remote_writers.get(guid)
+        if remote is None:
+            return
+        lease = remote.data.qos.liveliness.lease_duration
+        due = self._last_sign(remote) + lease
+        if due > now:
+            self._engine.set_remote_liveliness_timer(guid, due)
+            return
+        participant = remote.participant
+        if isinstance(participant, ParticipantProxy):
+            participant.has_lost_liveliness = True
+        self._set_alive(remote, now, alive=False)
+
+    def _last_sign(self, remote: RemoteWriter) -> float:
+        participant = remote.participant
+        if not isinstance(participant, ParticipantProxy):
+            return math.inf
+        policy = remote.data.qos.liveliness
+        if isinstance(policy, Automatic):
+            return participant.last_heard
+        if isinstance(policy, ManualByParticipant):
+            return max(participant.last_manual_assertion, self._asserted.get(remote.guid, 0.0))
+        return self._asserted.get(remote.guid, 0.0)
+
+    def revive(self, participant: ParticipantProxy, now: float) -> None:
+        """It speaks again: those of its writers whose kind is served by that are alive."""
+        participant.has_lost_liveliness = False
+        for remote in list(self._engine.remote_writers.values()):
+            if remote.participant is not participant or remote.guid not in self._asserted:
+                continue
+            if self._last_sign(remote) + remote.data.qos.liveliness.lease_duration > now:
+                self._set_alive(remote, now, alive=True)
+            else:
+                participant.has_lost_liveliness = True
+
+    def _set_alive(self, remote: RemoteWriter, now: float, *, alive: bool) -> None:
+        engine = self._engine
+        if alive:
+            engine.set_remote_liveliness_timer(remote.guid, now + remote.data.qos.liveliness.lease_duration)
+        for behavior, proxy in remote.readers:
+            if proxy.is_alive == alive:
+                continue
+            proxy.is_alive = alive
+            reader = engine.local_readers[behavior.guid]
+            if not alive and reader.history is not None:
+                reader.history.writer_lost(remote.guid, now)
+            change = 1 if alive else -1
+            engine.status(reader.guid, reader.liveliness_changed(remote.guid, alive=change, not_alive=-change))
+            if engine.trace is not None:
+                engine.trace(events.LivelinessChanged(now, engine.guid.prefix, reader.guid, remote.guid, alive))

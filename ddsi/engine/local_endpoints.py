@@ -1,0 +1,203 @@
+"""LocalWriter and LocalReader: an application's endpoint as the engine holds it.
+
+What was announced of it, its behavior, where its messages are packed, and its statuses (DDS 1.4 §2.2.4.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from ddsi.behavior.reader_history_cache import ReaderHistoryCache
+from ddsi.behavior.stateful_reader import StatefulReader
+from ddsi.behavior.stateful_writer import StatefulWriter
+from ddsi.messages.packer import MessagePacker
+from ddsi.spi import ProtectedEndpoint
+from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.guid import Guid
+from ddsi.structure.status import (
+    InconsistentTopic,
+    Incompatibility,
+    LivelinessChanged,
+    LivelinessLost,
+    OfferedIncompatibleQos,
+    PublicationMatched,
+    RequestedIncompatibleQos,
+    SampleLost,
+    SampleRejected,
+    Status,
+    SubscriptionMatched,
+)
+
+__all__ = ["KeyCodec", "LocalReader", "LocalWriter", "Octets"]
+
+Octets = bytes | bytearray | memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class KeyCodec:
+    """How a reader finds the instance that octets belong to; made from the topic's type.
+
+    Each returns the key in canonical form and raises MalformedSample.  ``from_key_hash`` returns None where the
+    hash is a digest that cannot be turned back.
+    """
+
+    from_payload: Callable[[Octets], bytes]
+    from_key_payload: Callable[[Octets], bytes]
+    from_key_hash: Callable[[bytes], bytes | None]
+    to_key_hash: Callable[[bytes], bytes]
+
+
+class LocalWriter:
+    """A DataWriter of this participant (or one of its builtin writers)."""
+
+    __slots__ = (
+        "assertion_due",
+        "behavior",
+        "data",
+        "dirty_since",
+        "guid",
+        "incompatible",
+        "liveliness",
+        "matched",
+        "packer",
+        "protection",
+        "receivers",
+        "wants_acknowledgment",
+    )
+
+    def __init__(self, data: DiscoveredWriterData, behavior: StatefulWriter, packer: MessagePacker) -> None:
+        self.data = data
+        self.guid: Guid = data.guid
+        self.behavior = behavior
+        self.packer = packer
+        self.protection = ProtectedEndpoint()
+        self.receivers: tuple[Guid, ...] = ()
+        self.matched = PublicationMatched()
+        self.incompatible = OfferedIncompatibleQos()
+        self.liveliness = LivelinessLost()
+        self.dirty_since = float("inf")
+        self.assertion_due = float("inf")
+        self.wants_acknowledgment = False
+
+    def match_changed(self, reader: Guid, change: int) -> Status:
+        """One matched reader more (+1) or less (-1)."""
+        status = self.matched
+        self.matched = PublicationMatched(
+            total_count=status.total_count + max(change, 0),
+            total_count_change=max(change, 0),
+            current_count=status.current_count + change,
+            current_count_change=change,
+            last_subscription_handle=reader,
+        )
+        return self.matched
+
+    def found_incompatible(self, reader: Guid, reasons: tuple[Incompatibility, ...]) -> Status:
+        self.incompatible = OfferedIncompatibleQos(
+            total_count=self.incompatible.total_count + 1,
+            total_count_change=1,
+            last_policy_id=reasons[0].policy_id,
+            incompatibilities=reasons,
+            last_subscription_handle=reader,
+        )
+        return self.incompatible
+
+    def liveliness_lost(self) -> Status:
+        self.liveliness = replace(self.liveliness, total_count=self.liveliness.total_count + 1, total_count_change=1)
+        return self.liveliness
+
+
+@dataclass(slots=True)
+class LocalReader:
+    """A DataReader of this participant.  ``history`` is the behavior's change sink."""
+
+    data: DiscoveredReaderData
+    behavior: StatefulReader
+    history: ReaderHistoryCache | None
+    keys: KeyCodec | None
+    guid: Guid = field(init=False)
+    protection: ProtectedEndpoint = ProtectedEndpoint()
+    matched: SubscriptionMatched = SubscriptionMatched()
+    incompatible: RequestedIncompatibleQos = RequestedIncompatibleQos()
+    liveliness: LivelinessChanged = LivelinessChanged()
+    lost: SampleLost = SampleLost()
+    rejected: SampleRejected = SampleRejected()
+    _keys_by_hash: dict[bytes, bytes] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.guid = self.data.guid
+
+    def match_changed(self, writer: Guid, change: int) -> Status:
+        """One matched writer more (+1) or less (-1)."""
+        status = self.matched
+        self.matched = SubscriptionMatched(
+            total_count=status.total_count + max(change, 0),
+            total_count_change=max(change, 0),
+            current_count=status.current_count + change,
+            current_count_change=change,
+            last_publication_handle=writer,
+        )
+        return self.matched
+
+    def liveliness_changed(self, writer: Guid, *, alive: int, not_alive: int) -> Status:
+        """So many writers more (or, negative, less) are alive, or are not."""
+        status = self.liveliness
+        self.liveliness = LivelinessChanged(
+            alive_count=status.alive_count + alive,
+            alive_count_change=alive,
+            not_alive_count=status.not_alive_count + not_alive,
+            not_alive_count_change=not_alive,
+            last_publication_handle=writer,
+        )
+        return self.liveliness
+
+    def found_incompatible(self, writer: Guid, reasons: tuple[Incompatibility, ...]) -> Status:
+        self.incompatible = RequestedIncompatibleQos(
+            total_count=self.incompatible.total_count + 1,
+            total_count_change=1,
+            last_policy_id=reasons[0].policy_id,
+            incompatibilities=reasons,
+            last_publication_handle=writer,
+        )
+        return self.incompatible
+
+    def samples_lost(self, count: int, reason: str) -> Status:
+        self.lost = SampleLost(total_count=self.lost.total_count + count, total_count_change=count, reason=reason)
+        return self.lost
+
+    def sample_rejected(self, reason: str) -> Status:
+        total = self.rejected.total_count + 1
+        self.rejected = SampleRejected(total_count=total, total_count_change=1, reason=reason)
+        return self.rejected
+
+    def inconsistent_topic(self, remote_type_name: str) -> Status:
+        return InconsistentTopic(total_count=1, total_count_change=1, remote_type_name=remote_type_name)
+
+    def key_of(self, change: CacheChange) -> bytes | None:
+        """The canonical key of the change's instance; None when it cannot be told.  Raises MalformedSample.
+
+        Without a payload only the key hash names the instance; where it is a digest, it is looked up among those known.
+        """
+        if self.keys is None:
+            return b""
+        if change.kind == 0:
+            return self.keys.from_payload(change.payload)
+        if len(change.payload) >= 4:
+            return self.keys.from_key_payload(change.payload)
+        if not change.key_hash:
+            return None
+        return self.keys.from_key_hash(change.key_hash) or self._known_key(change.key_hash)
+
+    def _known_key(self, key_hash: bytes) -> bytes | None:
+        if self.history is None:
+            return None
+        known = self._keys_by_hash
+        if key_hash not in known:
+            if len(known) > 2 * len(self.history.instances) + 64:
+                known.clear()
+            hashed = set(known.values())
+            for key in self.history.instances:
+                if key not in hashed and self.keys is not None:
+                    known[self.keys.to_key_hash(key)] = key
+        return known.get(key_hash)

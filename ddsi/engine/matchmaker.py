@@ -1,0 +1,333 @@
+"""Matchmaker: pairs local endpoints with remote and local ones, and remembers why others do not pair.
+
+RTPS 2.5 §8.5.4 and DDS 1.4 §2.2.3; the judgement itself is ``discovery.matching``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ddsi.behavior.defrag import Defragmenter
+from ddsi.behavior.stateful_reader import RemoteWriter
+from ddsi.discovery.matching import MatchRefusal, RefusalKind, judge
+from ddsi.discovery.participant_proxy import ParticipantProxy
+from ddsi.spi import PENDING, Admission, Refused
+from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.guid import Guid
+from ddsi.structure.locator import Locator
+from ddsi.structure.status import SecurityRefused
+from ddsi.trace import events
+from ddsi.trace.reasons import LossReason
+
+from .local_endpoints import LocalReader, LocalWriter
+
+if TYPE_CHECKING:
+    from .participant import Participant
+
+__all__ = ["Matchmaker"]
+
+_MAX_UNFINISHED_RELIABLE = 16
+_MAX_UNFINISHED_BEST_EFFORT = 4
+
+
+class Matchmaker:
+    """``refusals``: for each (local, remote) pair of one topic that does not match, the reason."""
+
+    def __init__(self, engine: Participant) -> None:
+        self._engine = engine
+        self.refusals: dict[tuple[Guid, Guid], MatchRefusal] = {}
+        self._pending: set[tuple[Guid, Guid]] = set()
+
+    # --- something appeared or changed -------------------------------------------------------------------
+
+    def writer_appeared(self, writer: LocalWriter, now: float) -> None:
+        """A local writer was created, or its QoS changed."""
+        for reader_data in self._engine.known_readers.of_topic(writer.data.topic_name):
+            self._consider_reader(writer, reader_data, now)
+        for reader in self._engine.user_readers(writer.data.topic_name):
+            self._consider_local(writer, reader, now)
+
+    def reader_appeared(self, reader: LocalReader, now: float) -> None:
+        """A local reader was created, or its QoS changed."""
+        for writer_data in self._engine.known_writers.of_topic(reader.data.topic_name):
+            self._consider_writer(reader, writer_data, now)
+        for writer in self._engine.user_writers(reader.data.topic_name):
+            self._consider_local(writer, reader, now)
+
+    def remote_reader_appeared(self, data: DiscoveredReaderData, now: float) -> None:
+        for writer in self._engine.user_writers(data.topic_name):
+            self._consider_reader(writer, data, now)
+
+    def remote_writer_appeared(self, data: DiscoveredWriterData, now: float) -> None:
+        for reader in self._engine.user_readers(data.topic_name):
+            self._consider_writer(reader, data, now)
+
+    # --- something went ----------------------------------------------------------------------------------
+
+    def writer_gone(self, writer: LocalWriter, now: float) -> None:
+        """A local writer is deleted: nothing of it stays in any table."""
+        for guid in list(writer.behavior.readers):
+            self._unmatch_reader(writer, guid, LossReason.CLOSED, now)
+        for guid in list(writer.behavior.local_readers):
+            self._unmatch_local(writer, self._engine.local_readers[guid], LossReason.CLOSED, now)
+        self._forget(writer.guid)
+
+    def reader_gone(self, reader: LocalReader, now: float) -> None:
+        for guid in list(reader.behavior.writers):
+            writer = self._engine.local_writers.get(guid)
+            if writer is not None:
+                self._unmatch_local(writer, reader, LossReason.CLOSED, now)
+            else:
+                self.unmatch_writer(reader, guid, LossReason.CLOSED, now)
+        self._forget(reader.guid)
+
+    def remote_reader_gone(self, data: DiscoveredReaderData, reason: LossReason, now: float) -> None:
+        for writer in self._engine.user_writers(data.topic_name):
+            if data.guid in writer.behavior.readers:
+                self._unmatch_reader(writer, data.guid, reason, now)
+            self._drop(writer.guid, data.guid)
+
+    def remote_writer_gone(self, data: DiscoveredWriterData, reason: LossReason, now: float) -> None:
+        for reader in self._engine.user_readers(data.topic_name):
+            if data.guid in reader.behavior.writers:
+                self.unmatch_writer(reader, data.guid, reason, now)
+            self._drop(reader.guid, data.guid)
+
+    def decided(self, local: Guid, remote: Guid, admission: Admission, now: float) -> None:
+        """Security made up its mind about a pair that was pending."""
+        if (local, remote) not in self._pending:
+            return
+        self._pending.discard((local, remote))
+        writer = self._engine.local_writers.get(local)
+        reader_data = self._engine.known_readers.get(remote)
+        if writer is not None and reader_data is not None:
+            if self._admits(local, remote, reader_data.topic_name, admission):
+                self._match_reader(writer, reader_data, now)
+            return
+        reader = self._engine.local_readers.get(local)
+        writer_data = self._engine.known_writers.get(remote)
+        if reader is not None and writer_data is not None:
+            if self._admits(local, remote, writer_data.topic_name, admission):
+                self._match_writer(reader, writer_data, now)
+
+    # --- pairs -------------------------------------------------------------------------------------------
+
+    def _consider_reader(self, writer: LocalWriter, data: DiscoveredReaderData, now: float) -> None:
+        """A local writer and a remote reader of its topic."""
+        engine = self._engine
+        participant = engine.participants.get(data.guid[:12])
+        if participant is None or not participant.is_admitted or writer.guid in engine.closing:
+            return
+        refusal = judge(writer.data, data)
+        matched = data.guid in writer.behavior.readers
+        if refusal is not None:
+            if matched:
+                self._unmatch_reader(writer, data.guid, LossReason.QOS_CHANGED, now)
+            if self._refused(writer.guid, data.guid, data.topic_name, refusal):
+                if refusal.kind is RefusalKind.QOS:
+                    engine.status(writer.guid, writer.found_incompatible(data.guid, refusal.incompatibilities))
+        elif matched:
+            writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
+        else:
+            admission = engine.hooks.match(writer.guid, data)
+            if self._admits(writer.guid, data.guid, data.topic_name, admission):
+                self._match_reader(writer, data, now)
+
+    def _consider_writer(self, reader: LocalReader, data: DiscoveredWriterData, now: float) -> None:
+        """A local reader and a remote writer of its topic."""
+        engine = self._engine
+        participant = engine.participants.get(data.guid[:12])
+        if participant is None or not participant.is_admitted:
+            return
+        refusal = judge(data, reader.data)
+        proxy = reader.behavior.writers.get(data.guid)
+        if refusal is not None:
+            if proxy is not None:
+                self.unmatch_writer(reader, data.guid, LossReason.QOS_CHANGED, now)
+            if self._refused(reader.guid, data.guid, data.topic_name, refusal):
+                if refusal.kind is RefusalKind.QOS:
+                    engine.status(reader.guid, reader.found_incompatible(data.guid, refusal.incompatibilities))
+                elif refusal.kind is RefusalKind.TYPE:
+                    engine.status(reader.guid, reader.inconsistent_topic(data.type_name))
+        elif proxy is not None:
+            proxy.data = data
+            proxy.locators = participant.user_traffic(data.unicast)
+        else:
+            admission = engine.hooks.match(reader.guid, data)
+            if self._admits(reader.guid, data.guid, data.topic_name, admission):
+                self._match_writer(reader, data, now)
+
+    def _consider_local(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
+        """Two endpoints of this participant: the same rules, no wire."""
+        refusal = judge(writer.data, reader.data)
+        matched = reader.guid in writer.behavior.local_readers
+        if refusal is not None:
+            if matched:
+                self._unmatch_local(writer, reader, LossReason.QOS_CHANGED, now)
+            if self._refused(writer.guid, reader.guid, writer.data.topic_name, refusal):
+                if refusal.kind is RefusalKind.QOS:
+                    reasons = refusal.incompatibilities
+                    self._engine.status(writer.guid, writer.found_incompatible(reader.guid, reasons))
+                    self._engine.status(reader.guid, reader.found_incompatible(writer.guid, reasons))
+        elif not matched and writer.guid not in self._engine.closing:
+            self._match_local(writer, reader, now)
+
+    def _match_reader(self, writer: LocalWriter, data: DiscoveredReaderData, now: float) -> None:
+        engine = self._engine
+        participant = engine.participants[data.guid[:12]]
+        transmissions = writer.behavior.matched_reader_add(data, participant.user_traffic(data.unicast), now)
+        writer.receivers = tuple(writer.behavior.readers)
+        self._note_matched(writer.guid, data.guid, data.topic_name, now)
+        engine.status(writer.guid, writer.match_changed(data.guid, 1))
+        engine.writer_answers(writer, transmissions)
+
+    def _match_writer(self, reader: LocalReader, data: DiscoveredWriterData, now: float) -> None:
+        engine = self._engine
+        participant = engine.participants[data.guid[:12]]
+        self.attach_writer(reader, data, participant, participant.user_traffic(data.unicast), now)
+        self._note_matched(reader.guid, data.guid, data.topic_name, now)
+        engine.status(reader.guid, reader.match_changed(data.guid, 1))
+        engine.status(reader.guid, reader.liveliness_changed(data.guid, alive=1, not_alive=0))
+        engine.liveliness.remote_writer_matched(data, now)
+
+    def attach_writer(
+        self,
+        reader: LocalReader,
+        data: DiscoveredWriterData,
+        participant: ParticipantProxy | None,
+        locators: tuple[Locator, ...],
+        now: float,
+        *,
+        uses_filter: bool = False,
+    ) -> None:
+        """Enter the pair into the tables that datagrams are looked up in; builtin endpoints come here directly."""
+        engine = self._engine
+        remote = engine.remote_writers.get(data.guid)
+        if remote is None:
+            reliable = data.qos.is_reliable
+            defragmenter = Defragmenter(
+                max_octets=engine.config.max_defrag_octets,
+                max_samples=_MAX_UNFINISHED_RELIABLE if reliable else _MAX_UNFINISHED_BEST_EFFORT,
+                keeps_lowest=reliable,
+            )
+            remote = engine.remote_writers[data.guid] = RemoteWriter(data, defragmenter, participant)
+        proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=uses_filter)
+        remote.readers.append((reader.behavior, proxy))
+        engine.proxy_touched(reader.behavior, proxy)
+
+    def _match_local(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
+        engine = self._engine
+        reader_proxy = writer.behavior.matched_local_reader_add(reader.data, now)
+        writer_proxy = reader.behavior.matched_writer_add(writer.data, (), now, is_local=True)
+        writer_proxy.reorder.next_sn = reader_proxy.history_sn + 1
+        writer_proxy.last_seq = reader_proxy.history_sn
+        self._note_matched(writer.guid, reader.guid, writer.data.topic_name, now)
+        engine.status(writer.guid, writer.match_changed(reader.guid, 1))
+        engine.status(reader.guid, reader.match_changed(writer.guid, 1))
+        engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=1, not_alive=0))
+        for change in writer.behavior.cache.changes():
+            if change.sequence_number > reader_proxy.history_sn:
+                engine.deliver_locally(writer, reader, change, now)
+
+    # --- the end of a pair -------------------------------------------------------------------------------
+
+    def _unmatch_reader(self, writer: LocalWriter, guid: Guid, reason: LossReason, now: float) -> None:
+        writer.behavior.matched_reader_remove(guid, now)
+        writer.receivers = tuple(writer.behavior.readers)
+        self._engine.hooks.unmatch(writer.guid, guid)
+        self._note_unmatched(writer.guid, guid, writer.data.topic_name, reason, now)
+        self._engine.status(writer.guid, writer.match_changed(guid, -1))
+        self._engine.writer_answers(writer, writer.behavior.unsent_changes(now))
+
+    def unmatch_writer(self, reader: LocalReader, guid: Guid, reason: LossReason, now: float) -> None:
+        engine = self._engine
+        proxy = reader.behavior.writers.get(guid)
+        self.detach_writer(reader, guid, now)
+        engine.hooks.unmatch(reader.guid, guid)
+        self._note_unmatched(reader.guid, guid, reader.data.topic_name, reason, now)
+        if reader.history is not None:
+            reader.history.writer_lost(guid, now)
+        engine.status(reader.guid, reader.match_changed(guid, -1))
+        alive = proxy is None or proxy.is_alive
+        engine.status(
+            reader.guid, reader.liveliness_changed(guid, alive=-1 if alive else 0, not_alive=0 if alive else -1)
+        )
+
+    def detach_writer(self, reader: LocalReader, guid: Guid, now: float) -> None:
+        """Undo :meth:`attach_writer`; fragments that were meant for this reader alone go with it."""
+        engine = self._engine
+        proxy = reader.behavior.matched_writer_remove(guid, now)
+        engine.forget_proxy(reader.guid, guid)
+        remote = engine.remote_writers.get(guid)
+        if remote is None or proxy is None:
+            return
+        remote.defragmenter.prune(engine.guid.prefix, reader.guid.entity_id, proxy.last_seq)
+        remote.readers = [pair for pair in remote.readers if pair[1] is not proxy]
+        if not remote.readers:
+            del engine.remote_writers[guid]
+            engine.liveliness.remote_writer_gone(guid)
+
+    def _unmatch_local(self, writer: LocalWriter, reader: LocalReader, reason: LossReason, now: float) -> None:
+        engine = self._engine
+        writer.behavior.matched_reader_remove(reader.guid, now)
+        reader.behavior.matched_writer_remove(writer.guid, now)
+        self._note_unmatched(writer.guid, reader.guid, writer.data.topic_name, reason, now)
+        if reader.history is not None:
+            reader.history.writer_lost(writer.guid, now)
+        engine.status(writer.guid, writer.match_changed(reader.guid, -1))
+        engine.status(reader.guid, reader.match_changed(writer.guid, -1))
+        engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-1, not_alive=0))
+        engine.writer_progressed(writer)
+
+    # --- refusals ----------------------------------------------------------------------------------------
+
+    def _admits(self, local: Guid, remote: Guid, topic_name: str, admission: Admission) -> bool:
+        if admission is PENDING:
+            self._pending.add((local, remote))
+            return False
+        if isinstance(admission, Refused):
+            refusal = MatchRefusal(RefusalKind.SECURITY, admission.reason, "")
+            if self._refused(local, remote, topic_name, refusal):
+                self._engine.status(local, SecurityRefused(remote=remote, reason=admission.reason))
+            return False
+        return True
+
+    def _refused(self, local: Guid, remote: Guid, topic_name: str, refusal: MatchRefusal) -> bool:
+        """Remember it; returns whether it is news."""
+        if self.refusals.get((local, remote)) == refusal:
+            return False
+        self.refusals[(local, remote)] = refusal
+        trace = self._engine.trace
+        if trace is not None:
+            prefix = self._engine.guid.prefix
+            for reason in refusal.incompatibilities:
+                trace(
+                    events.Incompatible(
+                        self._engine.now, prefix, local, remote, topic_name, reason.policy, reason.offered, reason.requested
+                    )
+                )
+            if not refusal.incompatibilities:
+                trace(
+                    events.Incompatible(
+                        self._engine.now, prefix, local, remote, topic_name, refusal.kind, refusal.offered, refusal.requested
+                    )
+                )
+        return True
+
+    def _note_matched(self, local: Guid, remote: Guid, topic_name: str, now: float) -> None:
+        self._drop(local, remote)
+        if self._engine.trace is not None:
+            self._engine.trace(events.Matched(now, self._engine.guid.prefix, local, remote, topic_name))
+
+    def _note_unmatched(self, local: Guid, remote: Guid, topic_name: str, reason: LossReason, now: float) -> None:
+        if self._engine.trace is not None:
+            self._engine.trace(events.Unmatched(now, self._engine.guid.prefix, local, remote, topic_name, reason))
+
+    def _drop(self, local: Guid, remote: Guid) -> None:
+        self.refusals.pop((local, remote), None)
+        self._pending.discard((local, remote))
+
+    def _forget(self, local: Guid) -> None:
+        for pair in [pair for pair in self.refusals if local in pair]:
+            del self.refusals[pair]
+        self._pending = {pair for pair in self._pending if local not in pair}

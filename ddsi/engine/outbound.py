@@ -1,0 +1,278 @@
+"""Outbound: transmissions become submessages, submessages become messages, messages become datagrams to send.
+
+RTPS 2.5 §8.3 and §8.4.  The hooks protect payload, submessage and message on the way; they are asked for the
+octets that this adds before anything is packed.  Submessages of different endpoints do not share a message, and a
+destination is never changed within one: some receivers drop the rest of a message after a submessage that
+they cannot place, and some keep an INFO_DST longer than they should (Fast DDS does both).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ddsi.behavior.reader_proxy import ReaderProxy
+from ddsi.behavior.transmissions import (
+    SendAckNack,
+    SendData,
+    SendFragments,
+    SendGap,
+    SendHeartbeat,
+    SendHeartbeatFrag,
+    SendNackFrag,
+    WriterTransmission,
+)
+from ddsi.behavior.writer_proxy import WriterProxy
+from ddsi.messages import fast
+from ddsi.messages.acknack import AckNack, NackFrag
+from ddsi.messages.data import Data
+from ddsi.messages.data_frag import DataFrag
+from ddsi.messages.gap import Gap
+from ddsi.messages.heartbeat import Heartbeat, HeartbeatFrag
+from ddsi.messages.interpreter import InfoDestination
+from ddsi.messages.packer import MessagePacker
+from ddsi.serialization.parameter_id import ParameterId
+from ddsi.serialization.parameter_list import ParameterList
+from ddsi.spi import Octets, Parts, SecurityHooks
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.guid import EntityId, Guid, GuidPrefix
+from ddsi.structure.locator import Locator
+
+from .effects import SendDatagram
+from .local_endpoints import LocalWriter
+
+__all__ = ["Outbound", "fragment_octets_for"]
+
+_PADDING = (b"", b"\0\0\0", b"\0\0", b"\0")
+_UNKNOWN_ID = bytes(4)
+# RTPS header, INFO_DST, INFO_TS, the head of a DATA_FRAG, a HEARTBEAT: what travels with a fragment.
+_FRAGMENT_COMPANY = 20 + 16 + 12 + 36 + 32
+_LARGEST_FRAGMENT = 65_000  # fragmentSize is a uint16, and a datagram ends at 65,507
+
+
+def fragment_octets_for(max_message_octets: int, configured: int | None, protection: int) -> int:
+    """The fragment size: as configured, else what fills a message beside its company and ``protection`` octets."""
+    room = max_message_octets - _FRAGMENT_COMPANY - protection
+    return max(min(configured or room, room, _LARGEST_FRAGMENT) & ~7, 8)
+
+
+class Outbound:
+    """Holds the messages under construction.  ``emit`` takes the finished ones."""
+
+    def __init__(
+        self,
+        header: bytes,
+        max_message_octets: int,
+        hooks: SecurityHooks,
+        emit: Callable[[SendDatagram], None],
+    ) -> None:
+        self._header = header
+        self._max_message_octets = max_message_octets
+        self._hooks = hooks
+        self._emit = emit
+        self._dirty_writers: dict[Guid, LocalWriter] = {}
+        # Messages to one participant, by sending entity, prefix and locators.
+        self._directed: dict[tuple[bytes, bytes, tuple[Locator, ...]], tuple[MessagePacker, Guid]] = {}
+
+    def new_packer(self, destination: GuidPrefix | None = None) -> MessagePacker:
+        head = self._header if destination is None else self._header + InfoDestination(destination).encode()
+        return MessagePacker(head, self._max_message_octets)
+
+    @property
+    def is_idle(self) -> bool:
+        return not self._dirty_writers and not self._directed
+
+    # --- writers -----------------------------------------------------------------------------------------
+
+    def send_change(self, writer: LocalWriter, change: CacheChange, now: float) -> None:
+        """The fast path for a fresh sample: DATA to all matched readers.  General form: :meth:`transmit`."""
+        behavior = writer.behavior
+        if not behavior.locators:
+            return
+        if change.kind is not ChangeKind.ALIVE or change.related is not None:
+            self._send_data(writer, change, None)
+            return
+        payload = self._hooks.encode_payload(writer.guid, change.payload)
+        size = len(payload)
+        padding = _PADDING[size & 3]
+        head = fast.data_head(_UNKNOWN_ID, writer.guid[12:], change.sequence_number, size + len(padding))
+        submessage = self._hooks.encode_submessage(writer.guid, writer.receivers, (head, payload, padding))
+        self._append_to_group(writer, submessage, change.source_timestamp)
+
+    def transmit(self, writer: LocalWriter, transmissions: Sequence[WriterTransmission]) -> None:
+        for item in transmissions:
+            match item:
+                case SendData(change, reader):
+                    self._send_data(writer, change, reader)
+                case SendFragments(change, first, last, reader):
+                    for number in range(first, last + 1):
+                        self._send_fragment(writer, change, number, reader)
+                case SendHeartbeat():
+                    self._send_heartbeat(writer, item)
+                case SendHeartbeatFrag(change, last, count):
+                    fragments = HeartbeatFrag(
+                        EntityId.UNKNOWN, writer.guid.entity_id, change.sequence_number, last, count
+                    )
+                    self._append(writer, None, fragments.encode(), None)
+                case SendGap(reader, start, irrelevant):
+                    gap = Gap(reader.entity_id, writer.guid.entity_id, start, irrelevant)
+                    self._append(writer, reader, gap.encode(), None)
+
+    def _send_data(self, writer: LocalWriter, change: CacheChange, reader: ReaderProxy | None) -> None:
+        payload = self._hooks.encode_payload(writer.guid, change.payload) if change.payload else b""
+        data = Data(
+            reader.entity_id if reader is not None else EntityId.UNKNOWN,
+            writer.guid.entity_id,
+            change.sequence_number,
+            _inline_qos(change),
+            payload,
+            is_key=change.kind is not ChangeKind.ALIVE,
+        )
+        self._append(writer, reader, data.encode(), change.source_timestamp)
+
+    def _send_fragment(
+        self, writer: LocalWriter, change: CacheChange, number: int, reader: ReaderProxy | None
+    ) -> None:
+        size = writer.behavior.fragment_octets
+        octets = memoryview(change.payload)[(number - 1) * size : number * size]
+        payload = self._hooks.encode_payload(writer.guid, octets)
+        padding = _PADDING[len(payload) & 3]
+        head = DataFrag(
+            reader.entity_id if reader is not None else EntityId.UNKNOWN,
+            writer.guid.entity_id,
+            change.sequence_number,
+            number,
+            1,
+            size,
+            len(change.payload),
+            _inline_qos(change) if number == 1 else None,
+            is_key=change.kind is not ChangeKind.ALIVE,
+        ).encode_head(len(payload) + len(padding))
+        self._append(writer, reader, (head, payload, padding), change.source_timestamp)
+
+    def _send_heartbeat(self, writer: LocalWriter, item: SendHeartbeat) -> None:
+        for reader in item.readers if item.readers is not None else (None,):
+            reader_id = reader.entity_id if reader is not None and len(item.readers or ()) == 1 else EntityId.UNKNOWN
+            heartbeat = Heartbeat(
+                reader_id, writer.guid.entity_id, item.first, item.last, item.count, item.final, item.liveliness
+            )
+            self._append(writer, reader, heartbeat.encode(), None)
+
+    def _append(
+        self, writer: LocalWriter, reader: ReaderProxy | None, submessage: Octets | Parts, ticks: int | None
+    ) -> None:
+        parts: Parts = (submessage,) if isinstance(submessage, (bytes, bytearray, memoryview)) else submessage
+        if reader is None:
+            if writer.behavior.locators:
+                parts = self._hooks.encode_submessage(writer.guid, writer.receivers, parts)
+                self._append_to_group(writer, parts, ticks)
+        elif reader.locators:
+            parts = self._hooks.encode_submessage(writer.guid, (reader.guid,), parts)
+            self._append_directed(writer.guid, reader.guid, reader.locators, parts, ticks)
+
+    def _append_to_group(self, writer: LocalWriter, parts: Parts, ticks: int | None) -> None:
+        packer = writer.packer
+        size = sum(map(len, parts))
+        if not packer.fits(size + 12):
+            self._emit_group(writer)
+        elif writer.guid not in self._dirty_writers:
+            self._dirty_writers[writer.guid] = writer
+        if ticks is not None and ticks != packer.timestamp:
+            packer.add((fast.timestamp(ticks),), 12)
+            packer.timestamp = ticks
+        packer.add(parts, size)
+        self._dirty_writers[writer.guid] = writer
+
+    # --- readers -----------------------------------------------------------------------------------------
+
+    def answer(
+        self, reader: Guid, writer: WriterProxy, answers: Sequence[SendAckNack | SendNackFrag]
+    ) -> None:
+        """ACKNACK and NACK_FRAG to one writer."""
+        if not writer.locators:
+            return
+        submessage: AckNack | NackFrag
+        for item in answers:
+            match item:
+                case SendAckNack(missing, count, final):
+                    submessage = AckNack(reader.entity_id, writer.entity_id, missing, count, final)
+                case SendNackFrag(sequence_number, missing, count):
+                    submessage = NackFrag(reader.entity_id, writer.entity_id, sequence_number, missing, count)
+            parts = self._hooks.encode_submessage(reader, (writer.guid,), (submessage.encode(),))
+            self._append_directed(reader, writer.guid, writer.locators, parts, None)
+
+    def _append_directed(
+        self, sender: Guid, receiver: Guid, locators: tuple[Locator, ...], parts: Parts, ticks: int | None
+    ) -> None:
+        prefix = receiver.prefix
+        key = (sender[12:], prefix, locators)
+        held = self._directed.get(key)
+        if held is None:
+            held = self._directed[key] = (self.new_packer(prefix), receiver)
+        packer = held[0]
+        size = sum(map(len, parts))
+        if not packer.fits(size + 12):
+            self._emit_message(packer, (receiver,), locators)
+        if ticks is not None and ticks != packer.timestamp:
+            packer.add((fast.timestamp(ticks),), 12)
+            packer.timestamp = ticks
+        packer.add(parts, size)
+
+    # --- out ---------------------------------------------------------------------------------------------
+
+    def send_plain(self, submessages: Parts, locators: tuple[Locator, ...]) -> None:
+        """A message that is never protected (SPDP, the stateless topic), at once."""
+        self._emit(SendDatagram(locators, [self._header, *submessages]))
+
+    def flush(self) -> None:
+        """Close every open message.  A HEARTBEAT rides behind the samples of each reliable writer."""
+        if self._dirty_writers:
+            for writer in list(self._dirty_writers.values()):
+                heartbeat = writer.behavior.piggyback_heartbeat()
+                if heartbeat is not None:
+                    self._piggyback(writer, heartbeat)
+                self._emit_group(writer)
+            self._dirty_writers.clear()
+        if self._directed:
+            directed, self._directed = self._directed, {}
+            for (_, _, locators), (packer, receiver) in directed.items():
+                self._emit_message(packer, (receiver,), locators)
+
+    def _piggyback(self, writer: LocalWriter, item: SendHeartbeat) -> None:
+        octets = fast.heartbeat(
+            _UNKNOWN_ID, writer.guid[12:], item.first, item.last, item.count, final=item.final
+        )
+        parts = self._hooks.encode_submessage(writer.guid, writer.receivers, (octets,))
+        size = sum(map(len, parts))
+        if not writer.packer.fits(size):
+            self._emit_group(writer)
+        writer.packer.add(parts, size)
+
+    def _emit_group(self, writer: LocalWriter) -> None:
+        self._emit_message(writer.packer, writer.receivers, writer.behavior.locators)
+
+    def _emit_message(self, packer: MessagePacker, receivers: tuple[Guid, ...], locators: tuple[Locator, ...]) -> None:
+        if packer.is_empty:
+            return
+        parts = packer.take()
+        if locators:
+            self._emit(SendDatagram(locators, self._hooks.encode_message(receivers, parts)))
+
+
+def _inline_qos(change: CacheChange) -> ParameterList | None:
+    """What must travel beside the payload: which end this is, and whose; and what the sample answers.
+
+    The key hash goes with every dispose and unregister, and the serialised key too: some stacks need the one
+    (Fast DDS), some the other (Cyclone DDS).
+    """
+    if change.kind is ChangeKind.ALIVE and change.related is None:
+        return None
+    parameters = ParameterList(little_endian=True)
+    if change.kind is not ChangeKind.ALIVE:
+        if change.key_hash:
+            parameters.add(ParameterId.KEY_HASH, change.key_hash)
+        parameters.add(ParameterId.STATUS_INFO, bytes((0, 0, 0, change.kind)))
+    if change.related is not None:
+        guid, number = change.related
+        identity = guid + (number >> 32).to_bytes(4, "little", signed=True) + (number & 0xFFFFFFFF).to_bytes(4, "little")
+        parameters.add(ParameterId.RELATED_SAMPLE_IDENTITY, identity)
+    return parameters

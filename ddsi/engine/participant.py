@@ -1,0 +1,712 @@
+"""Participant: one DDS participant as a machine without sockets, clock or tasks.
+
+RTPS 2.5 §8.2.4.1.  The contract with whoever drives it:
+
+1. Give it one input: :meth:`receive_datagram`, :meth:`handle_timeout`, or one of the application's verbs.
+2. Act on everything that :meth:`drain_effects` returns, in order.
+3. Wait for the next input, at most until :meth:`next_deadline`; then call :meth:`handle_timeout`.
+
+``now`` is a clock in seconds that never runs backward, the same for all calls; wall time and randomness are
+given to the constructor.  Nothing a peer sends makes any of these methods raise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from random import Random
+from typing import TypeVar
+
+from ddsi.behavior.reader_history_cache import ReaderHistoryCache
+from ddsi.behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
+from ddsi.behavior.stateful_writer import StatefulWriter
+from ddsi.behavior.transmissions import WriterTransmission
+from ddsi.behavior.writer_proxy import WriterProxy
+from ddsi.config import Config
+from ddsi.discovery.builtin_endpoints import BUILTIN_QOS, BUILTIN_TOPICS
+from ddsi.discovery.endpoint_registry import EndpointRegistry
+from ddsi.discovery.participant_proxy import ParticipantProxy
+from ddsi.messages.header import Header
+from ddsi.spi import PLAINTEXT, Compute as HookCompute, Decided, LocalParticipant, Octets, SecurityHooks, SendMessage
+from ddsi.structure import builtin_entity_ids as ids
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
+from ddsi.structure.locator import Locator
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.qos_policies import BinaryProperty, Properties, Property
+from ddsi.structure.status import SecurityRefused, Status
+from ddsi.structure.time import ticks_from_nanoseconds
+from ddsi.structure.vendor import PROTOCOL_VERSION
+from ddsi.trace import events
+from ddsi.trace.reasons import DropReason, LossReason, SampleLossReason
+from ddsi.trace.sink import TraceSink
+
+from .discovery_agent import DiscoveryAgent
+from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
+from .inbound import Inbound
+from .liveliness import Liveliness
+from .local_endpoints import KeyCodec, LocalReader, LocalWriter
+from .matchmaker import Matchmaker
+from .outbound import Outbound, fragment_octets_for
+from .timers import Timers
+
+__all__ = ["Participant", "ParticipantSetup", "Timer"]
+
+_Endpoint = TypeVar("_Endpoint")
+_FLUSH_AFTER_S = 0.001
+_LINGER_S = 1.0
+_REORDER_MAX_OCTETS = 64 << 20
+
+
+class Timer(Enum):
+    """What the engine waits for.  Keys of the timer table are (Timer, Guid...)."""
+
+    SPDP = "announce ourselves"
+    LEASE = "a remote participant has been silent for its lease"
+    WRITER = "a writer's heartbeat, pace or lifespan"
+    ACKNACK = "a reader's answer to one writer"
+    ASSERTION = "assert automatic liveliness"
+    WRITER_LIVELINESS = "a local manual writer was not asserted"
+    REMOTE_LIVELINESS = "a remote writer's liveliness lease"
+    FLUSH = "queued samples must leave"
+    LINGER = "a closed writer has waited long enough for acknowledgment"
+    SECURITY = "the hooks asked to be called"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParticipantSetup:
+    """Where and as whom a participant lives; made by transport or simulation.
+
+    ``announce_to``: multicast groups and peers.  ``max_message_octets``: the largest UDP payload to send.
+    """
+
+    domain_id: int
+    guid_prefix: GuidPrefix
+    config: Config = field(default_factory=Config)
+    metatraffic_unicast: tuple[Locator, ...] = ()
+    metatraffic_multicast: tuple[Locator, ...] = ()
+    default_unicast: tuple[Locator, ...] = ()
+    default_multicast: tuple[Locator, ...] = ()
+    announce_to: tuple[Locator, ...] = ()
+    max_message_octets: int = 1452
+    entity_name: str = ""
+    user_data: bytes = b""
+    properties: Properties = field(default_factory=dict)
+
+
+class _BuiltinInbox:
+    """A ChangeSink for a builtin topic: changes wait here until the datagram has been read to its end."""
+
+    __slots__ = ("_reader_id", "_waiting")
+
+    def __init__(self, reader_id: EntityId, waiting: list[tuple[EntityId, CacheChange]]) -> None:
+        self._reader_id = reader_id
+        self._waiting = waiting
+
+    def add(self, change: CacheChange, now: float) -> bool:
+        self._waiting.append((self._reader_id, change))
+        return True
+
+
+class Participant:
+    """See the module's text for how to drive it.  Other names: domain participant, ``participant`` in Cyclone DDS."""
+
+    def __init__(
+        self,
+        setup: ParticipantSetup,
+        *,
+        random: Random,
+        wall_clock: Callable[[], int],
+        hooks: SecurityHooks = PLAINTEXT,
+        trace: TraceSink | None = None,
+    ) -> None:
+        """``wall_clock()``: nanoseconds since 1970.  Raises NotAllowedBySecurity if the hooks refuse the participant."""
+        self.config = setup.config
+        self.domain_id = setup.domain_id
+        self.hooks = hooks
+        self.random = random
+        self.trace = trace
+        self.now = 0.0
+        candidate = LocalParticipant(
+            guid=Guid.of(setup.guid_prefix, EntityId.PARTICIPANT),
+            domain_id=setup.domain_id,
+            domain_tag=setup.config.domain_tag,
+            properties=setup.properties,
+        )
+        self.guid = hooks.local_participant(candidate)
+        self._wall_clock = wall_clock
+        self._timers = Timers()
+        self._effects: list[Effect] = []
+        self._waiting: list[tuple[EntityId, CacheChange]] = []
+        self._flush_armed = False
+        self._next_entity_key = 1
+        self._is_closed = False
+        self.drops: Counter[DropReason] = Counter()
+        self.participants: dict[bytes, ParticipantProxy] = {}
+        self.known_writers: EndpointRegistry[DiscoveredWriterData] = EndpointRegistry()
+        self.known_readers: EndpointRegistry[DiscoveredReaderData] = EndpointRegistry()
+        self.local_writers: dict[bytes, LocalWriter] = {}
+        self.local_readers: dict[bytes, LocalReader] = {}
+        self._writers_by_topic: dict[str, dict[Guid, LocalWriter]] = {}
+        self._readers_by_topic: dict[str, dict[Guid, LocalReader]] = {}
+        self.remote_writers: dict[bytes, RemoteWriter] = {}
+        self.closing: set[Guid] = set()
+        header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
+        self._max_message_octets = setup.max_message_octets
+        self.outbound = Outbound(header, setup.max_message_octets, hooks, self._effects.append)
+        self.inbound = Inbound(self)
+        self.matchmaker = Matchmaker(self)
+        self.liveliness = Liveliness(self)
+        self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
+        self._create_builtin_endpoints()
+
+    # --- the four calls ----------------------------------------------------------------------------------
+
+    def start(self, now: float) -> None:
+        """Begin to announce; the first input."""
+        self.now = now
+        if self.trace is not None:
+            self.trace(events.ParticipantCreated(now, self.guid.prefix, self.domain_id, self.config.vendor_id))
+        self.discovery.start(now)
+
+    def receive_datagram(self, octets: Octets, source: Locator, now: float) -> None:
+        """One datagram from the network.  ``octets`` is only read during the call; what is kept is copied."""
+        if self._is_closed:
+            return
+        self.now = now
+        if self.trace is not None:
+            self.trace(events.MessageReceived(now, self.guid.prefix, source, bytes(octets)))
+        self.inbound.receive(octets, source, now)
+        if self._waiting:
+            self._process_builtin_changes(now)
+
+    def handle_timeout(self, now: float) -> None:
+        """Run every timer that is due."""
+        self.now = now
+        while (key := self._timers.pop_due(now)) is not None and not self._is_closed:
+            self._fire(key, now)
+        if self._waiting:
+            self._process_builtin_changes(now)
+
+    def next_deadline(self) -> float:
+        """When :meth:`handle_timeout` is wanted at the latest, in engine seconds; ``math.inf`` for never."""
+        return self._timers.next_deadline()
+
+    def drain_effects(self) -> list[Effect]:
+        """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
+        self.flush()
+        self._collect_hook_effects()
+        if not self._effects:
+            return []
+        effects = list(self._effects)
+        self._effects.clear()
+        return effects
+
+    @property
+    def has_effects(self) -> bool:
+        """Is anything to be done at once?  Queued samples do not count until their message is full or due."""
+        return bool(self._effects)
+
+    def flush(self) -> None:
+        """Send what is queued: several small samples may have been waiting for each other."""
+        if not self.outbound.is_idle:
+            sent = len(self._effects)
+            self.outbound.flush()
+            if self.trace is not None:
+                self._trace_sent(sent)
+        if self._flush_armed:
+            self._flush_armed = False
+            self._timers.cancel(Timer.FLUSH)
+
+    def _trace_sent(self, start: int) -> None:
+        assert self.trace is not None
+        for effect in self._effects[start:]:
+            if isinstance(effect, SendDatagram):
+                octets = b"".join(effect.parts)
+                self.trace(events.MessageSent(self.now, self.guid.prefix, effect.destinations, octets))
+
+    # --- endpoints ---------------------------------------------------------------------------------------
+
+    def create_writer(
+        self, topic_name: str, type_name: str, qos: EndpointQos, now: float, *, is_keyed: bool, filters: bool = False,
+        type_information: bytes = b"",
+    ) -> LocalWriter:
+        """Create, announce and match a writer.  Raises NotAllowedBySecurity, and nothing has changed then."""
+        self.now = now
+        kind = EntityKind.WRITER_WITH_KEY if is_keyed else EntityKind.WRITER_NO_KEY
+        data = DiscoveredWriterData(
+            guid=self._new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
+            vendor_id=self.config.vendor_id, type_information=type_information,
+        )  # fmt: skip
+        protection = self.hooks.local_writer(data)
+        data = replace(data, security_parameters=protection.parameters)
+        writer = self._add_writer(data, filters=filters)
+        writer.protection = protection
+        self._writers_by_topic.setdefault(topic_name, {})[writer.guid] = writer
+        self._trace_created(data, now)
+        self.discovery.announce_writer(data, now)
+        self.liveliness.writer_added(writer, now)
+        self.matchmaker.writer_appeared(writer, now)
+        return writer
+
+    def create_reader(
+        self, topic_name: str, type_name: str, qos: EndpointQos, now: float, *, is_keyed: bool,
+        keys: KeyCodec | None = None, type_information: bytes = b"",
+    ) -> LocalReader:
+        """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then."""
+        self.now = now
+        kind = EntityKind.READER_WITH_KEY if is_keyed else EntityKind.READER_NO_KEY
+        data = DiscoveredReaderData(
+            guid=self._new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
+            vendor_id=self.config.vendor_id, type_information=type_information,
+        )  # fmt: skip
+        protection = self.hooks.local_reader(data)
+        data = replace(data, security_parameters=protection.parameters)
+        guid = data.guid
+        history = ReaderHistoryCache(
+            qos,
+            max_octets=self.config.reader_octets,
+            max_instances=self.config.max_instances,
+            clock_offset=self._wall_clock() / 1e9 - now,
+            on_news=lambda: self._effects.append(DataAvailable(guid)),
+            on_rejected=lambda reason: self._sample_rejected(guid, reason),
+        )
+        reader = self._add_reader(data, history, keys)
+        reader.protection = protection
+        self._readers_by_topic.setdefault(topic_name, {})[guid] = reader
+        self._trace_created(data, now)
+        self.discovery.announce_reader(data, now)
+        self.matchmaker.reader_appeared(reader, now)
+        return reader
+
+    def delete_writer(self, writer: LocalWriter, now: float) -> None:
+        """Say that it is gone; but first its readers may, for a second at most, ask for what they miss."""
+        self.now = now
+        if writer.guid not in self.local_writers or writer.guid in self.closing:
+            return
+        self.closing.add(writer.guid)
+        behavior = writer.behavior
+        if behavior.is_reliable and behavior.readers and behavior.min_acked_sn() < behavior.cache.last_sn:
+            self._timers.set((Timer.LINGER, writer.guid), now + _LINGER_S)
+            self.writer_answers(writer, behavior.request_acknowledgment())
+        else:
+            self._finish_writer(writer, now)
+
+    def _finish_writer(self, writer: LocalWriter, now: float) -> None:
+        self.matchmaker.writer_gone(writer, now)
+        self.hooks.local_endpoint_deleted(writer.guid)
+        self.discovery.announce_writer_gone(writer.guid, now)
+        self.closing.discard(writer.guid)
+        del self.local_writers[writer.guid]
+        _remove_from_topic(self._writers_by_topic, writer.data.topic_name, writer.guid)
+        for timer in (Timer.WRITER, Timer.LINGER, Timer.WRITER_LIVELINESS):
+            self._timers.cancel((timer, writer.guid))
+        if self.trace is not None:
+            self.trace(events.EndpointClosed(now, self.guid.prefix, writer.guid))
+
+    def delete_reader(self, reader: LocalReader, now: float) -> None:
+        self.now = now
+        if reader.guid not in self.local_readers:
+            return
+        self.matchmaker.reader_gone(reader, now)
+        self.hooks.local_endpoint_deleted(reader.guid)
+        self.discovery.announce_reader_gone(reader.guid, now)
+        del self.local_readers[reader.guid]
+        _remove_from_topic(self._readers_by_topic, reader.data.topic_name, reader.guid)
+        if self.trace is not None:
+            self.trace(events.EndpointClosed(now, self.guid.prefix, reader.guid))
+
+    def close(self, now: float) -> None:
+        """Goodbye: endpoints first, then the participant.  The effects that this leaves must still be drained."""
+        if self._is_closed:
+            return
+        self.now = now
+        for writer in list(self.user_writers()):
+            self._finish_writer(writer, now)
+        for reader in list(self.user_readers()):
+            self.delete_reader(reader, now)
+        self.outbound.flush()
+        self.discovery.say_goodbye()
+        self._is_closed = True
+        if self.trace is not None:
+            self.trace(events.ParticipantClosed(now, self.guid.prefix))
+
+    def user_writers(self, topic_name: str | None = None) -> list[LocalWriter]:
+        """The application's writers, of all topics or of one."""
+        if topic_name is not None:
+            return list(self._writers_by_topic.get(topic_name, {}).values())
+        return [writer for of_topic in self._writers_by_topic.values() for writer in of_topic.values()]
+
+    def user_readers(self, topic_name: str | None = None) -> list[LocalReader]:
+        """The application's readers, of all topics or of one."""
+        if topic_name is not None:
+            return list(self._readers_by_topic.get(topic_name, {}).values())
+        return [reader for of_topic in self._readers_by_topic.values() for reader in of_topic.values()]
+
+    # --- writing -----------------------------------------------------------------------------------------
+
+    def write(
+        self,
+        writer: LocalWriter,
+        kind: ChangeKind,
+        payload: bytes,
+        key: bytes,
+        now: float,
+        *,
+        source_timestamp: int | None = None,
+        key_hash: bytes = b"",
+        destination: Guid = GUID_UNKNOWN,
+        related: tuple[Guid, int] | None = None,
+    ) -> CacheChange:
+        """One change into the history, and on its way.  Ask ``writer.behavior.lacks_room`` first.
+
+        ``source_timestamp`` in ticks.  It leaves when its message is full, at the next flush, or after 1 ms.
+        """
+        self.now = now
+        behavior = writer.behavior
+        change = behavior.new_change(
+            kind,
+            payload,
+            key,
+            self.wall_ticks() if source_timestamp is None else source_timestamp,
+            now,
+            key_hash=key_hash,
+            destination=destination,
+            related=related,
+        )
+        if self.trace is not None:
+            self.trace(
+                events.ChangeWritten(now, self.guid.prefix, writer.guid, change.sequence_number, kind, len(payload))
+            )
+        if behavior.local_readers:
+            for guid in list(behavior.local_readers):
+                self.deliver_locally(writer, self.local_readers[guid], change, now)
+        if behavior.sends_directly(change):
+            self.outbound.send_change(writer, change, now)
+        else:
+            self.outbound.transmit(writer, behavior.unsent_changes(now))
+        if writer.assertion_due != math.inf:
+            self.liveliness.written(writer, now)
+        self._timers.set((Timer.WRITER, writer.guid), behavior.next_deadline())
+        if not self._flush_armed and not self.outbound.is_idle:
+            self._flush_armed = True
+            self._timers.set(Timer.FLUSH, now + _FLUSH_AFTER_S)
+        return change
+
+    def write_builtin(
+        self, writer_id: EntityId, kind: ChangeKind, payload: bytes, key: bytes, now: float
+    ) -> CacheChange:
+        """A change of a builtin topic; its key is its key hash (RTPS 2.5 §9.6.4.8)."""
+        writer = self.local_writers[Guid.of(self.guid.prefix, writer_id)]
+        return self.write(writer, kind, payload, key, now, key_hash=key if kind is not ChangeKind.ALIVE else b"")
+
+    def deliver_locally(self, writer: LocalWriter, reader: LocalReader, change: CacheChange, now: float) -> None:
+        """Hand a change to a reader of this participant."""
+        writer_proxy = reader.behavior.writers[writer.guid]
+        reader_proxy = writer.behavior.local_readers[reader.guid]
+        reader.behavior.receive_data(writer_proxy, change, now)
+        writer.behavior.local_reader_progress(reader_proxy, writer_proxy.next_sn - 1, now)
+
+    def samples_taken(self, reader: LocalReader, now: float) -> None:
+        """The application took samples: what waited for room goes on, and its writers are told."""
+        self.now = now
+        for proxy in reader.behavior.resume(now):
+            if not proxy.is_local:
+                self.proxy_touched(reader.behavior, proxy)
+                continue
+            writer = self.local_writers[proxy.guid]
+            reader_proxy = writer.behavior.local_readers[reader.guid]
+            writer.behavior.local_reader_progress(reader_proxy, proxy.next_sn - 1, now)
+            self.writer_progressed(writer)
+
+    def request_acknowledgment(self, writer: LocalWriter, now: float) -> None:
+        """Somebody waits: ask all who lack something, now."""
+        self.now = now
+        self.writer_answers(writer, writer.behavior.request_acknowledgment())
+
+    # --- what the parts of the engine tell each other ------------------------------------------------------
+
+    def writer_answers(self, writer: LocalWriter, transmissions: Sequence[WriterTransmission]) -> None:
+        """A writer decided to send these; its timer may have moved and somebody may wait for its progress."""
+        if transmissions:
+            self.outbound.transmit(writer, transmissions)
+        self._timers.set((Timer.WRITER, writer.guid), writer.behavior.next_deadline())
+        self.writer_progressed(writer)
+
+    def writer_progressed(self, writer: LocalWriter) -> None:
+        if writer.wants_acknowledgment:
+            self._effects.append(WriterProgress(writer.guid))
+        if writer.guid in self.closing and writer.behavior.min_acked_sn() >= writer.behavior.cache.last_sn:
+            self._timers.set((Timer.LINGER, writer.guid), self.now)
+
+    def proxy_touched(self, reader: StatefulReader, proxy: WriterProxy) -> None:
+        """A reader's schedule towards one writer moved."""
+        self._timers.set((Timer.ACKNACK, reader.guid, proxy.guid), proxy.schedule.due)
+
+    def forget_proxy(self, reader: Guid, writer: Guid) -> None:
+        self._timers.cancel((Timer.ACKNACK, reader, writer))
+
+    def fragments_announced(self, reader: LocalReader, proxy: WriterProxy, number: int, last_fragment: int) -> None:
+        """HEARTBEAT_FRAG: ask for fragments that should be here, if any of that sample is."""
+        remote = self.remote_writers.get(proxy.guid)
+        if remote is None:
+            return
+        sample = remote.defragmenter.partial_for(self.guid.prefix, reader.guid.entity_id).get(number)
+        missing = sample.missing(last_fragment) if sample is not None else None
+        if missing:
+            self.outbound.answer(reader.guid, proxy, [proxy.nack_frag(number, missing)])
+
+    def host_heard(self, participant: ParticipantProxy, now: float) -> None:
+        """It spoke from another host, or announced other locators: whom we could not reach we perhaps can now."""
+        for writer in self.local_writers.values():
+            for guid, reader in list(writer.behavior.readers.items()):
+                if guid.startswith(participant.prefix):
+                    builtin = guid.entity_id.is_builtin
+                    locators = participant.metatraffic if builtin else participant.user_traffic(reader.data.unicast)
+                    writer.behavior.matched_reader_update(guid, reader.data, locators)
+        for remote in self.remote_writers.values():
+            if remote.participant is participant:
+                builtin = remote.guid.entity_id.is_builtin
+                locators = participant.metatraffic if builtin else participant.user_traffic(remote.data.unicast)
+                for _, proxy in remote.readers:
+                    proxy.locators = locators
+
+    def status(self, entity: Guid, status: Status) -> None:
+        self._effects.append(StatusChanged(entity, status))
+        if self.trace is not None:
+            self.trace(events.StatusChanged(self.now, self.guid.prefix, entity, type(status).__name__, repr(status)))
+
+    def discovery_changed(self) -> None:
+        if not self._effects or not isinstance(self._effects[-1], DiscoveryChanged):
+            self._effects.append(DiscoveryChanged())
+
+    def dropped(self, reason: DropReason, source: Locator | None, detail: str = "") -> None:
+        """Count something that was not acted upon."""
+        self.drops[reason] += 1
+        if self.trace is not None:
+            self.trace(events.Dropped(self.now, self.guid.prefix, reason, source, detail))
+
+    def dropped_discovery(self, change: CacheChange, detail: str) -> None:
+        self.dropped(DropReason.MALFORMED_DISCOVERY_DATA, None, f"{change.writer_guid}: {detail}")
+
+    def samples_lost(self, reader: LocalReader, proxy: WriterProxy, count: int, first: int, reason: str) -> None:
+        self.status(reader.guid, reader.samples_lost(count, reason))
+        if self.trace is not None:
+            why = SampleLossReason.BEST_EFFORT if reason == "best effort" else SampleLossReason.NOT_AVAILABLE
+            self.trace(events.SampleLost(self.now, self.guid.prefix, reader.guid, proxy.guid, first, first + count - 1, why))
+
+    def sample_malformed(self, reader: LocalReader, change: CacheChange, detail: str) -> None:
+        """Octets that are no sample of the topic's type: lost, with the reason."""
+        reason = f"sample {change.sequence_number} of {change.writer_guid} does not decode: {detail}"
+        self.status(reader.guid, reader.samples_lost(1, reason))
+        if self.trace is not None:
+            number = change.sequence_number
+            why = SampleLossReason.MALFORMED_SAMPLE
+            self.trace(
+                events.SampleLost(self.now, self.guid.prefix, reader.guid, change.writer_guid, number, number, why, detail)
+            )
+
+    def _sample_rejected(self, guid: Guid, reason: str) -> None:
+        self.status(guid, self.local_readers[guid].sample_rejected(reason))
+
+    def send_spdp(self, submessage: bytes, destinations: tuple[Locator, ...]) -> None:
+        sent = len(self._effects)
+        self.outbound.send_plain((submessage,), destinations)
+        if self.trace is not None:
+            self._trace_sent(sent)
+
+    def wall_ticks(self) -> int:
+        """The wall clock in ticks."""
+        return ticks_from_nanoseconds(self._wall_clock())
+
+    def reception_ticks(self, now: float) -> int:
+        """The source timestamp of a sample that came without one."""
+        return self.wall_ticks()
+
+    # --- timers ------------------------------------------------------------------------------------------
+
+    def set_spdp_timer(self, deadline: float) -> None:
+        self._timers.set(Timer.SPDP, deadline)
+
+    def set_lease_timer(self, participant: ParticipantProxy) -> None:
+        self._timers.set((Timer.LEASE, participant.prefix), participant.lease_due)
+
+    def cancel_lease_timer(self, participant: ParticipantProxy) -> None:
+        self._timers.cancel((Timer.LEASE, participant.prefix))
+
+    def set_assertion_timer(self, now: float) -> None:
+        self._timers.set(Timer.ASSERTION, now)
+
+    def set_writer_liveliness_timer(self, writer: LocalWriter) -> None:
+        self._timers.set((Timer.WRITER_LIVELINESS, writer.guid), writer.assertion_due)
+
+    def set_remote_liveliness_timer(self, guid: Guid, deadline: float) -> None:
+        self._timers.set((Timer.REMOTE_LIVELINESS, guid), deadline)
+
+    def _fire(self, key: Hashable, now: float) -> None:
+        timer, *rest = key if isinstance(key, tuple) else (key,)
+        if self.trace is not None:
+            self.trace(events.TimerFired(now, self.guid.prefix, timer.name.lower(), now))
+        match timer:
+            case Timer.SPDP:
+                self.discovery.announce_due(now)
+            case Timer.LEASE:
+                self.discovery.lease_due(rest[0], now)
+            case Timer.WRITER:
+                writer = self.local_writers.get(rest[0])
+                if writer is not None:
+                    self.writer_answers(writer, writer.behavior.handle_timeout(now))
+            case Timer.ACKNACK:
+                self._answer_writer(rest[0], rest[1], now)
+            case Timer.ASSERTION:
+                self.liveliness.assert_automatic(now)
+                self._timers.set(Timer.ASSERTION, now + self.liveliness.assertion_period())
+            case Timer.WRITER_LIVELINESS:
+                writer = self.local_writers.get(rest[0])
+                if writer is not None:
+                    self.liveliness.writer_due(writer, now)
+            case Timer.REMOTE_LIVELINESS:
+                self.liveliness.remote_writer_due(rest[0], now)
+            case Timer.FLUSH:
+                self._flush_armed = False
+                self.flush()
+            case Timer.LINGER:
+                if rest[0] in self.closing:
+                    self._finish_writer(self.local_writers[rest[0]], now)
+            case Timer.SECURITY:
+                self.hooks.handle_timeout(now)
+
+    def _answer_writer(self, reader_guid: Guid, writer_guid: Guid, now: float) -> None:
+        reader = self.local_readers.get(reader_guid)
+        proxy = reader.behavior.writers.get(writer_guid) if reader is not None else None
+        if reader is None or proxy is None:
+            return
+        answers = reader.behavior.handle_timeout(proxy, self.remote_writers.get(writer_guid), now)
+        self.outbound.answer(reader_guid, proxy, answers)
+        self.proxy_touched(reader.behavior, proxy)
+
+    # --- builtin endpoints -------------------------------------------------------------------------------
+
+    def _create_builtin_endpoints(self) -> None:
+        for topic in BUILTIN_TOPICS:
+            common = {"topic_name": topic.name, "type_name": topic.name, "qos": BUILTIN_QOS}
+            writer = DiscoveredWriterData(guid=Guid.of(self.guid.prefix, topic.writer_id), **common)  # type: ignore[arg-type]
+            reader = DiscoveredReaderData(guid=Guid.of(self.guid.prefix, topic.reader_id), **common)  # type: ignore[arg-type]
+            self._add_writer(writer)
+            self._add_reader(reader, _BuiltinInbox(topic.reader_id, self._waiting), None)
+
+    def _process_builtin_changes(self, now: float) -> None:
+        waiting = list(self._waiting)
+        self._waiting.clear()
+        for reader_id, change in waiting:
+            if reader_id == ids.SEDP_PUBLICATIONS_READER:
+                self.discovery.receive_publication(change, now)
+            elif reader_id == ids.SEDP_SUBSCRIPTIONS_READER:
+                self.discovery.receive_subscription(change, now)
+            elif reader_id == ids.PARTICIPANT_MESSAGE_READER:
+                self.liveliness.receive_participant_message(change, now)
+            else:
+                self.hooks.receive_message(change, now)
+
+    def _collect_hook_effects(self) -> None:
+        for effect in self.hooks.drain_effects():
+            match effect:
+                case SendMessage(writer_id, change):
+                    writer = self.local_writers[Guid.of(self.guid.prefix, writer_id)]
+                    self.write(
+                        writer, change.kind, bytes(change.payload), change.key, self.now, destination=change.destination
+                    )
+                    self.flush()
+                case HookCompute():
+                    asked = effect
+                    self._effects.append(
+                        Compute(asked.job, lambda result, now, asked=asked: self.hooks.computed(asked, result, now))  # type: ignore[misc]
+                    )
+                case Decided(local, remote, admission):
+                    self._decided(effect, self.now)
+        self._timers.set(Timer.SECURITY, self.hooks.next_deadline())
+
+    def _decided(self, effect: Decided, now: float) -> None:
+        if effect.local != self.guid:
+            self.matchmaker.decided(effect.local, effect.remote, effect.admission, now)
+            return
+        proxy = self.participants.get(effect.remote[:12])
+        if proxy is None:
+            return
+        if hasattr(effect.admission, "reason"):
+            self.status(self.guid, SecurityRefused(remote=effect.remote, reason=effect.admission.reason))
+            self.discovery.participant_lost(effect.remote, LossReason.REJECTED_BY_SECURITY, now)
+        else:
+            self.discovery.participant_admitted(proxy, now)
+
+    # --- making endpoints --------------------------------------------------------------------------------
+
+    def _add_writer(self, data: DiscoveredWriterData, *, filters: bool = False) -> LocalWriter:
+        overhead = self.hooks.overhead(data.guid, ())
+        behavior = StatefulWriter(
+            data.guid,
+            data.qos,
+            fragment_octets=fragment_octets_for(
+                self._max_message_octets,
+                self.config.fragment_size,
+                overhead.payload + overhead.submessage + overhead.message,
+            ),
+            unacknowledged_octets_max=self.config.unacknowledged_octets,
+            filters=filters,
+        )
+        writer = self.local_writers[data.guid] = LocalWriter(data, behavior, self.outbound.new_packer())
+        return writer
+
+    def _add_reader(self, data: DiscoveredReaderData, history: ChangeSink, keys: KeyCodec | None) -> LocalReader:
+        behavior = StatefulReader(
+            data.guid,
+            data.qos,
+            history,
+            reorder_max_samples=self.config.max_reorder_samples,
+            reorder_max_octets=_REORDER_MAX_OCTETS,
+        )
+        cache = history if isinstance(history, ReaderHistoryCache) else None
+        reader = self.local_readers[data.guid] = LocalReader(data, behavior, cache, keys)
+        return reader
+
+    def _new_guid(self, kind: EntityKind) -> Guid:
+        key = self._next_entity_key
+        self._next_entity_key += 1
+        return Guid.of(self.guid.prefix, EntityId.user(key, kind))
+
+    def _trace_created(self, data: DiscoveredWriterData | DiscoveredReaderData, now: float) -> None:
+        if self.trace is not None:
+            self.trace(events.EndpointCreated(now, self.guid.prefix, data.guid, data.topic_name, data.type_name))
+
+
+def _remove_from_topic(table: dict[str, dict[Guid, _Endpoint]], topic_name: str, guid: Guid) -> None:
+    del table[topic_name][guid]
+    if not table[topic_name]:
+        del table[topic_name]
+
+
+def _own_data(setup: ParticipantSetup, guid: Guid) -> DiscoveredParticipantData:
+    """What SPDP says of us; properties only where they are to be propagated."""
+    propagated: list[tuple[str, Property | BinaryProperty]] = [
+        (name, value)
+        for name, value in setup.properties.items()
+        if isinstance(value, (Property, BinaryProperty)) and value.propagate
+    ]
+    return DiscoveredParticipantData(
+        guid=guid,
+        vendor_id=setup.config.vendor_id,
+        domain_id=setup.domain_id,
+        domain_tag=setup.config.domain_tag,
+        metatraffic_unicast=setup.metatraffic_unicast,
+        metatraffic_multicast=setup.metatraffic_multicast,
+        default_unicast=setup.default_unicast,
+        default_multicast=setup.default_multicast,
+        lease_duration=setup.config.lease_duration,
+        entity_name=setup.entity_name,
+        user_data=setup.user_data,
+        properties=tuple(propagated),
+    )
