@@ -22,7 +22,8 @@ __all__ = ["SCHEMA_NAME", "SCHEMA_VERSION", "Category", "MalformedTrace", "Pairs
 
 SCHEMA_NAME = "ddsi-trace"
 SCHEMA_VERSION = 1
-"""Raised when a field changes its meaning or goes; new events and new fields with a default do not raise it."""
+"""Raised when a field goes or changes its meaning, or reasons are added; not for new events, nor for new fields with a
+default."""
 
 Pairs = tuple[tuple[str, str], ...]
 """Names with texts, in order; a JSON object."""

@@ -2,8 +2,8 @@
 
 The engine that emits them is RTPS 2.5 chapter 8; the order here is that of its life: messages, discovery, matching,
 data, timers and statuses, security, and last the simulated link.  Arguments come in field order: ``now``,
-``participant``, then the event's own.  No field ever holds a key or decrypted octets: ``octets`` are what is on the
-wire.  ``from_json`` reads back what ``to_json`` wrote.
+``participant``, then the event's own.  No field ever holds cryptographic keys or what was decrypted: ``octets`` are
+what is on the wire.  ``from_json`` reads back what ``to_json`` wrote.
 """
 
 from __future__ import annotations
@@ -398,13 +398,16 @@ class LivelinessChanged(TraceEvent):
 
 @dataclass(frozen=True, slots=True)
 class DeadlineMissed(TraceEvent):
-    """An instance went without a sample for a deadline period; ``endpoint`` is ours, ``key`` the instance's."""
+    """An instance went without a sample for a deadline period; ``endpoint`` is ours.
+
+    ``key_hash`` names the instance; where its data is protected, only as the hash that may be seen on the wire.
+    """
 
     NAME: ClassVar[str] = "deadline_missed"
     CATEGORY: ClassVar[Category] = Category.STATUS
 
     endpoint: Guid
-    key: bytes
+    key_hash: bytes
 
 
 @dataclass(frozen=True, slots=True)
