@@ -1,0 +1,140 @@
+"""The Cryptographic interface for octets: CryptoTransform.
+
+DDS-Security 1.1 §8.5.1.9; conventions: :mod:`ddsi_security.plugins`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from ddsi.spi import Octets, Outcome, Overhead, Refused
+
+from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
+
+__all__ = ["CryptoTransform", "SecureSubmessage", "SecureSubmessageCategory"]
+
+
+class SecureSubmessageCategory(Enum):
+    """SecureSubmessageCategory_t (§8.5.1.9.6): who sent a protected submessage."""
+
+    INFO_SUBMESSAGE = "nobody in particular"
+    DATAWRITER_SUBMESSAGE = "a writer"
+    DATAREADER_SUBMESSAGE = "a reader"
+
+
+@dataclass(frozen=True, slots=True)
+class SecureSubmessage:
+    """What can be told of a protected submessage before it is decoded: which decoder it needs, with which keys.
+
+    Of a writer's submessage, ``datawriter`` sent it and ``datareader`` receives it; of a reader's the other way round.
+    """
+
+    category: SecureSubmessageCategory
+    datawriter: DatawriterCryptoHandle | None = None
+    datareader: DatareaderCryptoHandle | None = None
+
+
+class CryptoTransform(Protocol):
+    """Protects what is sent and opens what is received.  §8.5.1.9; called by the service for each message.
+
+    Encoders append to a buffer of the caller's, which they leave as it was when they refuse; a refusal means that
+    nothing is sent.  They encode for all receivers at once: the OMG's ``..._list_index`` has no part here.
+    Decoders return the plain octets, or why there are none: not for us, no keys, rejected.
+    """
+
+    def overhead(
+        self,
+        sender: ParticipantCryptoHandle | DatawriterCryptoHandle | DatareaderCryptoHandle,
+        receivers: int,
+    ) -> Overhead:
+        """How many octets the encoders below add at most.  Asked before a message is packed.  Not the OMG's."""
+        ...
+
+    def encode_serialized_payload(
+        self,
+        encoded_buffer: bytearray,
+        extra_inline_qos: bytearray,
+        plain_buffer: Octets,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+    ) -> Refused | None:
+        """§8.5.1.9.1.  A whole SerializedPayload, or one run of its fragments."""
+        ...
+
+    def encode_datawriter_submessage(
+        self,
+        encoded_rtps_submessage: bytearray,
+        plain_rtps_submessage: Octets,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+        receiving_datareader_crypto_list: Sequence[DatareaderCryptoHandle],
+    ) -> Refused | None:
+        """§8.5.1.9.2.  A writer's submessage with its header in, SEC_PREFIX to SEC_POSTFIX out."""
+        ...
+
+    def encode_datareader_submessage(
+        self,
+        encoded_rtps_submessage: bytearray,
+        plain_rtps_submessage: Octets,
+        sending_datareader_crypto: DatareaderCryptoHandle,
+        receiving_datawriter_crypto_list: Sequence[DatawriterCryptoHandle],
+    ) -> Refused | None:
+        """§8.5.1.9.3.  A reader's submessage with its header in, SEC_PREFIX to SEC_POSTFIX out."""
+        ...
+
+    def encode_rtps_message(
+        self,
+        encoded_rtps_message: bytearray,
+        plain_rtps_message: Octets,
+        sending_participant_crypto: ParticipantCryptoHandle,
+        receiving_participant_crypto_list: Sequence[ParticipantCryptoHandle],
+    ) -> Refused | None:
+        """§8.5.1.9.4.  A message with its RTPS header, in and out."""
+        ...
+
+    def decode_rtps_message(
+        self,
+        encoded_rtps_message: Octets,
+        receiving_participant_crypto: ParticipantCryptoHandle,
+        sending_participant_crypto: ParticipantCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.5.  A message whose first submessage is SRTPS_PREFIX; without it again, with its RTPS header."""
+        ...
+
+    def preprocess_secure_submsg(
+        self,
+        encoded_rtps_submessage: Octets,
+        receiving_participant_crypto: ParticipantCryptoHandle,
+        sending_participant_crypto: ParticipantCryptoHandle,
+    ) -> SecureSubmessage | Outcome:
+        """§8.5.1.9.6.  Beginning with SEC_PREFIX, whose key identifier tells."""
+        ...
+
+    def decode_datawriter_submessage(
+        self,
+        encoded_rtps_submessage: Octets,
+        receiving_datareader_crypto: DatareaderCryptoHandle,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.7.  SEC_PREFIX to SEC_POSTFIX in, one submessage out."""
+        ...
+
+    def decode_datareader_submessage(
+        self,
+        encoded_rtps_submessage: Octets,
+        receiving_datawriter_crypto: DatawriterCryptoHandle,
+        sending_datareader_crypto: DatareaderCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.8.  SEC_PREFIX to SEC_POSTFIX in, one submessage out."""
+        ...
+
+    def decode_serialized_payload(
+        self,
+        encoded_buffer: Octets,
+        inline_qos: Octets,
+        receiving_datareader_crypto: DatareaderCryptoHandle,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.9.  A whole payload, or one run of fragments, as it was encoded."""
+        ...
