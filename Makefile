@@ -76,6 +76,6 @@ $(VENV)/.ready-to-lint: $(VENV)/.ready-to-test pyproject.toml
 # There are no wheels of the peers for every platform, so doing without them is an error only where they are required.
 $(VENV)/.ready-with-peers: $(VENV)/.ready-to-run pyproject.toml
 	@echo '$(BIN)/python -m pip install --quiet --group peers'
-	@$(BIN)/python -m pip install --quiet --group peers || { test -z "$(DDSI_REQUIRE_PEERS)" && \
-	  echo >&2 "The peers from PyPI cannot be installed here; the tests that need them will be skipped."; }
-	@touch $@
+	@if $(BIN)/python -m pip install --quiet --group peers; then touch $@; \
+	elif test -n "$(DDSI_REQUIRE_PEERS)"; then exit 1; \
+	else echo >&2 "The peers from PyPI cannot be installed here; the tests that need them are skipped."; fi
