@@ -1,0 +1,203 @@
+"""The words with which a Python class says its IDL type; applications see this module as ``ddsi.idl``.
+
+    @idl.struct(typename="ShapeType")
+    class ShapeType:
+        color: Annotated[str, idl.key, idl.bound(128)]
+        x: idl.int32
+        points: idl.sequence[idl.float64] = ()
+
+OMG IDL 4.2 §7.4 and DDS-XTypes 1.3 §7.3.  To a type checker ``idl.int32`` is ``int``, ``idl.float64`` is ``float``
+and ``idl.sequence[T]`` is ``Sequence[T]``, which for octets ``bytes`` fulfils as well.  Not yet: unions, maps, wide
+strings, loading of IDL text.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import Field, field
+from enum import IntEnum, IntFlag
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
+
+from . import model
+from .annotations import Array, Bound, ElementOf, Flag, HashId, MemberId
+from .definition import define_struct
+from .enumerations import describe_bitmask, describe_enum
+from .model import Extensibility
+
+__all__ = [
+    "APPENDABLE",
+    "FINAL",
+    "MUTABLE",
+    "Extensibility",
+    "array",
+    "array_of",
+    "bitmask",
+    "boolean",
+    "bound",
+    "char",
+    "enum",
+    "external",
+    "float32",
+    "float64",
+    "hashid",
+    "id",
+    "int8",
+    "int16",
+    "int32",
+    "int64",
+    "key",
+    "must_understand",
+    "octet",
+    "optional",
+    "sequence",
+    "sequence_of",
+    "struct",
+    "uint8",
+    "uint16",
+    "uint32",
+    "uint64",
+    "wchar",
+]
+
+_T = TypeVar("_T")
+_C = TypeVar("_C")
+_E = TypeVar("_E", bound=IntEnum)
+_F = TypeVar("_F", bound=IntFlag)
+
+FINAL = Extensibility.FINAL
+APPENDABLE = Extensibility.APPENDABLE
+MUTABLE = Extensibility.MUTABLE
+
+boolean: TypeAlias = Annotated[bool, model.BOOLEAN]
+octet: TypeAlias = Annotated[int, model.OCTET]
+char: TypeAlias = Annotated[str, model.CHAR]
+wchar: TypeAlias = Annotated[str, model.WCHAR]
+int8: TypeAlias = Annotated[int, model.INT8]
+int16: TypeAlias = Annotated[int, model.INT16]
+int32: TypeAlias = Annotated[int, model.INT32]
+int64: TypeAlias = Annotated[int, model.INT64]
+uint8: TypeAlias = Annotated[int, model.UINT8]
+uint16: TypeAlias = Annotated[int, model.UINT16]
+uint32: TypeAlias = Annotated[int, model.UINT32]
+uint64: TypeAlias = Annotated[int, model.UINT64]
+float32: TypeAlias = Annotated[float, model.FLOAT32]
+float64: TypeAlias = Annotated[float, model.FLOAT64]
+
+sequence: TypeAlias = Sequence[_T]
+"""``idl.sequence[T]``, for any T.  Takes lists, tuples and, for numbers, any buffer.  Comes back as ``bytes`` for
+octet and uint8, ``array.array`` for other numbers, ``str`` for characters, a list for the rest."""
+
+key = Flag("key")
+"""The member is part of the key (IDL ``@key``)."""
+
+optional = Flag("optional")
+"""The member may be None and then does not travel (IDL ``@optional``); the same as ``T | None``."""
+
+must_understand = Flag("must_understand")
+"""A receiver that does not know the member rejects the sample (IDL ``@must_understand``)."""
+
+external = Flag("external")
+"""IDL ``@external``: it changes neither the Python value nor the encoding."""
+
+hashid = HashId()
+"""The member id is the hash of the member's name, or of a given one: ``idl.hashid("name")``."""
+
+
+def bound(limit: int) -> Bound:
+    """The most octets (UTF-8, without NUL) of a string, or elements of a sequence."""
+    return Bound(limit)
+
+
+def array(*dimensions: int) -> Array:
+    """A fixed number of elements: ``Annotated[idl.sequence[idl.int32], idl.array(5)]``.
+
+    With several dimensions, rows of rows: ``Annotated[idl.sequence[idl.sequence[idl.int32]], idl.array(2, 3)]``.  As
+    many levels of ``sequence`` as there are dimensions are the array's own; what is left is the element.
+    """
+    return Array(dimensions)
+
+
+def id(number: int) -> MemberId:
+    """The member id, 0 to 0x0fffffff (IDL ``@id``)."""
+    return MemberId(number)
+
+
+def sequence_of(element: Any) -> ElementOf:
+    """The element of a sequence whose Python type does not tell it.
+
+    ``Annotated[npt.NDArray[np.float64], idl.sequence_of(idl.float64)]``: values come back as numpy arrays;
+    ``Annotated[bytes, idl.sequence_of(idl.uint8)]``: as bytes.
+    """
+    return ElementOf(element)
+
+
+def array_of(element: Any, *dimensions: int) -> _ArrayOf:
+    """As :func:`sequence_of`, for an array: ``Annotated[npt.NDArray[np.float64], idl.array_of(idl.float64, 3, 4)]``."""
+    return (ElementOf(element), Array(dimensions))
+
+
+_ArrayOf: TypeAlias = tuple[ElementOf, Array]
+
+
+@overload
+def struct(python_class: type[_C], /) -> type[_C]: ...
+@overload
+def struct(
+    *,
+    typename: str | None = None,
+    extensibility: Extensibility = Extensibility.APPENDABLE,
+    autoid: Literal["sequential", "hash"] = "sequential",
+) -> Callable[[type[_C]], type[_C]]: ...
+@dataclass_transform(field_specifiers=(field, Field))
+def struct(
+    python_class: type[Any] | None = None,
+    /,
+    *,
+    typename: str | None = None,
+    extensibility: Extensibility = Extensibility.APPENDABLE,
+    autoid: Literal["sequential", "hash"] = "sequential",
+) -> Any:
+    """Make a class an IDL struct: a dataclass with slots whose annotations say the IDL types.
+
+    ``typename`` is the name on the wire (``module::Name``; default: the class's name); ``extensibility`` is
+    ``idl.FINAL``, ``idl.APPENDABLE`` (the default, as in IDL 4.2) or ``idl.MUTABLE``; ``autoid`` tells how members
+    without ``idl.id`` get their ids.  A base class that is a struct is the IDL base.
+
+    Raises BadParameter, naming member and reason, for a class that cannot be a type; where an annotation names
+    what is not yet defined, at first use.
+    """
+    frame = sys._getframe(1)  # where local classes are found, which the module does not know
+
+    def decorate(undecorated: type[Any]) -> type[Any]:
+        return define_struct(undecorated, type_name=typename, extensibility=extensibility, autoid=autoid, frame=frame)
+
+    return decorate if python_class is None else decorate(python_class)
+
+
+def enum(
+    *, typename: str | None = None, bit_bound: int = 32, default: str | None = None
+) -> Callable[[type[_E]], type[_E]]:
+    """Say more of an ``IntEnum`` than its literals: the type name, ``@bit_bound`` (1 to 32), ``@default_literal``.
+
+    Without this decorator any ``enum.IntEnum`` is an IDL enum of 32 bits whose first literal is the default.
+    """
+
+    def decorate(python_class: type[_E]) -> type[_E]:
+        describe_enum(python_class, type_name=typename, bit_bound=bit_bound, default=default)
+        return python_class
+
+    return decorate
+
+
+def bitmask(*, typename: str | None = None, bit_bound: int = 32) -> Callable[[type[_F]], type[_F]]:
+    """Say more of an ``IntFlag`` than its flags: the type name, ``@bit_bound`` (1 to 64).
+
+    Without this decorator any ``enum.IntFlag`` is an IDL bitmask of 32 bits.
+    """
+
+    def decorate(python_class: type[_F]) -> type[_F]:
+        describe_bitmask(python_class, type_name=typename, bit_bound=bit_bound)
+        return python_class
+
+    return decorate

@@ -1,0 +1,61 @@
+"""Samples and octets, for applications: what ``ddsi.serialize`` and its siblings do.
+
+The octets are those of the object alone (DDS-XTypes 1.3 §7.4), behind the 4 octets of encapsulation header; padding
+at the end, which writers add for transport, is neither made nor missed here.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, TypeVar
+
+from ..structure.errors import BadParameter
+from ..structure.qos_policies import DataRepresentationId
+from .type_support import Octets, TypeSupport, type_support
+
+__all__ = ["deserialize", "key_hash", "serialize"]
+
+T = TypeVar("T")
+
+
+def serialize(
+    sample: object,
+    *,
+    representation: DataRepresentationId | None = None,
+    byteorder: Literal["little", "big"] = "little",
+) -> bytes:
+    """The octets of a sample, encapsulation header first.
+
+    ``representation`` is ``ddsi.XCDR1`` or ``ddsi.XCDR2``; by default what a writer of this type uses by default.
+    Raises BadParameter for a sample that is not of an IDL type, or whose values do not fit it (with the member's path).
+    """
+    support = _support_of(sample)
+    if byteorder not in ("little", "big"):
+        raise BadParameter(f'byteorder is "little" or "big", not {byteorder!r}')
+    chosen = support.representations[0] if representation is None else representation
+    return support.serializer(chosen, byteorder == "little", padded=False)(sample)
+
+
+def deserialize(type: type[T], data: Octets) -> T:
+    """The sample of ``type`` in ``data``, which begins with the encapsulation header.
+
+    Raises MalformedSample if the octets are not such a sample, BadParameter for a class that is no IDL type.
+    """
+    if not isinstance(data, (bytes, bytearray, memoryview)):
+        raise BadParameter(f"data are octets (bytes, bytearray or memoryview), not {data.__class__.__name__}")
+    return type_support(type).deserialize(data)
+
+
+def key_hash(sample: object, representation: DataRepresentationId | None = None) -> bytes:
+    """The 16 octets of a sample's key hash (RTPS 2.5 §9.6.4.8), by default in the representation of a writer.
+
+    Zeros for a type without key.  Raises BadParameter as :func:`serialize` does.
+    """
+    support = _support_of(sample)
+    chosen = support.representations[0] if representation is None else representation
+    return support.key_hash(support.key(sample), chosen)
+
+
+def _support_of(sample: object) -> TypeSupport[Any]:
+    if isinstance(sample, type):
+        raise BadParameter(f"a sample is asked for, not the class {sample.__name__}")
+    return type_support(sample.__class__)

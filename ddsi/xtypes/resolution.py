@@ -1,0 +1,231 @@
+"""From a Python annotation to an IDL type.
+
+``Annotated[idl.sequence[idl.int32], idl.bound(8), idl.key]`` becomes ``SequenceType(INT32, 8)`` and a key flag.  What
+cannot be an IDL type is refused with the reason; the caller puts the member's name before it.  A name that is not
+defined yet raises ``NameError``, so that the caller may try again later.
+"""
+
+from __future__ import annotations
+
+import collections.abc
+import enum
+import sys
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from ..structure.errors import BadParameter
+from . import model
+from .annotations import Array, Bound, ElementOf, Flag, HashId, MemberId
+from .enumerations import bitmask_type, enum_type
+from .model import ArrayType, IdlType, Primitive, SequenceType, String, StructType
+
+__all__ = ["Resolved", "Resolver"]
+
+STRUCT_ATTRIBUTE = "__idl_struct__"
+"""Where a class decorated with ``idl.struct`` keeps its :class:`StructType`."""
+
+_NUMPY_NUMBERS = {
+    primitive.name: primitive
+    for primitive in (
+        *(model.INT8, model.INT16, model.INT32, model.INT64, model.FLOAT32, model.FLOAT64),
+        *(model.UINT8, model.UINT16, model.UINT32, model.UINT64),
+    )
+}
+
+_SEQUENCES = (list, collections.abc.Sequence, collections.abc.MutableSequence)
+
+
+@dataclass(slots=True)
+class Resolved:
+    """The type that an annotation says, and the markers found on the way."""
+
+    type: IdlType
+    flags: set[str] = field(default_factory=set)
+    member_id: MemberId | HashId | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Resolver:
+    """Resolves the annotations of one class; ``names`` are looked at before the module's globals."""
+
+    module_names: dict[str, Any]
+    names: Mapping[str, Any]
+
+    def resolve(self, annotation: Any) -> Resolved:
+        annotation = self._evaluate(annotation)
+        origin = typing.get_origin(annotation)
+        if origin is Annotated:
+            base, *markers = typing.get_args(annotation)
+            return self._annotated(base, markers)
+        if origin in (typing.Union, types.UnionType):
+            return self._optional(typing.get_args(annotation))
+        if isinstance(annotation, str):
+            raise BadParameter(f"{annotation!r} is no type")
+        return Resolved(self._plain(annotation, origin))
+
+    def _evaluate(self, annotation: Any) -> Any:
+        """Strings (PEP 563, quoted names), forward references (PEP 649) and ``type`` aliases (PEP 695)."""
+        for _ in range(16):  # an alias of an alias; nobody nests more
+            if isinstance(annotation, str):
+                annotation = eval(annotation, self.module_names, dict(self.names))
+            elif isinstance(annotation, typing.ForwardRef):
+                annotation = self._forward(annotation)
+            elif type(annotation).__name__ == "TypeAliasType":
+                annotation = annotation.__value__
+            elif isinstance(annotation, typing.NewType):
+                annotation = annotation.__supertype__
+            else:
+                break
+        return annotation
+
+    def _forward(self, reference: typing.ForwardRef) -> Any:
+        if sys.version_info >= (3, 14):
+            return reference.evaluate(globals=self.module_names, locals=dict(self.names))
+        return reference.__forward_arg__
+
+    # --- markers ---------------------------------------------------------------------------------------
+
+    def _annotated(self, base: Any, markers: list[Any]) -> Resolved:
+        markers = [inner for marker in markers for inner in (marker if isinstance(marker, tuple) else (marker,))]
+        given = [marker for marker in markers if isinstance(marker, (Primitive, ElementOf))]
+        if not given:
+            resolved = self.resolve(base)
+        elif isinstance(given[0], Primitive):
+            resolved = Resolved(given[0])
+        else:
+            element = self.resolve(given[0].annotation).type
+            resolved = Resolved(SequenceType(element, numpy=_is_numpy(self._evaluate(base), element)))
+        for marker in markers:
+            self._mark(resolved, marker)
+        return resolved
+
+    def _mark(self, resolved: Resolved, marker: Any) -> None:
+        match marker:
+            case Bound():
+                resolved.type = _bounded(resolved.type, marker.limit)
+            case Array():
+                resolved.type = _array(resolved.type, marker.dimensions)
+            case Flag():
+                resolved.flags.add(marker.name)
+            case MemberId() | HashId():
+                resolved.member_id = marker
+            case types.FunctionType() if marker.__module__.endswith(".xtypes.idl"):
+                raise BadParameter(f"idl.{marker.__name__} needs its argument, as in idl.{marker.__name__}(8)")
+            case _:
+                pass  # other libraries' metadata (PEP 593), and what is resolved already
+
+    def _optional(self, alternatives: tuple[Any, ...]) -> Resolved:
+        present = [alternative for alternative in alternatives if alternative is not type(None)]
+        if len(present) != 1 or len(present) == len(alternatives):
+            raise BadParameter("a choice of types is an IDL union, which is not supported yet")
+        resolved = self.resolve(present[0])
+        resolved.flags.add("optional")
+        return resolved
+
+    # --- plain types -----------------------------------------------------------------------------------
+
+    def _plain(self, annotation: Any, origin: Any) -> IdlType:
+        if origin in _SEQUENCES:
+            return self._sequence(typing.get_args(annotation)[0])
+        if _is_ndarray(origin or annotation):
+            return _numpy_sequence(annotation)
+        if annotation is str:
+            return String()
+        if annotation is bool:
+            return model.BOOLEAN
+        if annotation is float:
+            return model.FLOAT64
+        if annotation in (bytes, bytearray):
+            return SequenceType(model.OCTET)
+        if isinstance(annotation, type):
+            return _class_type(annotation)
+        raise BadParameter(_why_not(annotation, origin))
+
+    def _sequence(self, element: Any) -> SequenceType:
+        resolved = self.resolve(element)
+        unfit = resolved.flags | ({"id"} if resolved.member_id is not None else set())
+        if unfit:
+            raise BadParameter(f"idl.{min(unfit)} belongs to the member, not to the elements of its sequence")
+        return SequenceType(resolved.type)
+
+
+def _bounded(type_: IdlType, limit: int) -> IdlType:
+    match type_:
+        case String(bound=None):
+            return String(limit)
+        case SequenceType(bound=None):
+            return SequenceType(type_.element, limit, type_.numpy)
+        case ArrayType():
+            raise BadParameter("idl.bound stands before idl.array, or on the element")
+        case String() | SequenceType():
+            raise BadParameter("idl.bound is given twice")
+        case _:
+            raise BadParameter(f"idl.bound fits strings and sequences, not {type_}")
+
+
+def _array(type_: IdlType, dimensions: tuple[int, ...]) -> ArrayType:
+    numpy = isinstance(type_, SequenceType) and type_.numpy
+    for _ in dimensions:
+        if isinstance(type_, SequenceType) and type_.bound is None:
+            type_ = type_.element
+    if isinstance(type_, ArrayType):
+        return ArrayType(type_.element, (*dimensions, *type_.dimensions), numpy or type_.numpy)
+    return ArrayType(type_, dimensions, numpy)
+
+
+def _class_type(annotation: type[Any]) -> IdlType:
+    struct = annotation.__dict__.get(STRUCT_ATTRIBUTE)
+    if isinstance(struct, StructType):
+        return struct
+    if issubclass(annotation, enum.IntFlag):
+        return bitmask_type(annotation)
+    if issubclass(annotation, enum.IntEnum):
+        return enum_type(annotation)
+    raise BadParameter(_why_not(annotation, None))
+
+
+def _why_not(annotation: Any, origin: Any) -> str:
+    shown = getattr(annotation, "__name__", None) or repr(annotation)
+    if annotation is int:
+        return "int does not say its width; use idl.int32 or another of idl's integers"
+    if dict in (annotation, origin) or origin is collections.abc.Mapping:
+        return "maps are not supported yet"
+    if annotation in _SEQUENCES:
+        return f"{shown} does not say of what; use idl.sequence[...]"
+    if tuple in (annotation, origin):
+        return "a tuple is no IDL type; use idl.sequence[...], with idl.array(n) for a fixed number of elements"
+    if isinstance(annotation, Flag | Bound | Array | MemberId | HashId):
+        return f"{annotation!r} stands inside Annotated[type, ...], behind a type"
+    if isinstance(annotation, type) and issubclass(annotation, enum.Enum):
+        return f"{shown} is an Enum; IDL enums are enum.IntEnum, bitmasks enum.IntFlag"
+    if isinstance(annotation, type) and annotation.__module__ != "builtins":
+        return f"class {shown} is no IDL type; decorate it with @idl.struct"
+    return f"{shown} is no IDL type"
+
+
+# --- numpy, without importing it ---------------------------------------------------------------------------
+
+
+def _is_ndarray(annotation: Any) -> bool:
+    return getattr(annotation, "__name__", "") == "ndarray" and getattr(annotation, "__module__", "") == "numpy"
+
+
+def _is_numpy(annotation: Any, element: IdlType) -> bool:
+    if not _is_ndarray(typing.get_origin(annotation) or annotation):
+        return False
+    if not isinstance(element, Primitive) or not (element.is_number or element == model.BOOLEAN):
+        raise BadParameter(f"a numpy array of {element} is not possible; numbers and booleans are")
+    return True
+
+
+def _numpy_sequence(annotation: Any) -> SequenceType:
+    """``npt.NDArray[np.float64]`` says its element itself."""
+    arguments = typing.get_args(annotation)
+    scalar = typing.get_args(arguments[1])[0] if len(arguments) == 2 and typing.get_args(arguments[1]) else None
+    element = _NUMPY_NUMBERS.get(getattr(scalar, "__name__", ""))
+    if element is None:
+        raise BadParameter("this numpy array does not say its element; add idl.sequence_of(idl.float64) or the like")
+    return SequenceType(element, numpy=True)

@@ -1,0 +1,349 @@
+"""Everything a participant needs of one topic type: its codecs, its key, its name.
+
+:func:`type_support` makes it once per class.  Codecs are generated when they are first asked for, one per
+representation and byte order.  DDS 1.4 §2.2.2.3.6 (TypeSupport), DDS-XTypes 1.3 §7.6.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from ..structure.errors import BadParameter, MalformedSample
+from ..structure.qos_policies import DataRepresentationId
+from .careful_reader import read_carefully
+from .definition import struct_type
+from .key_source import generate_key_extractor
+from .keys import KEY_HASH_OCTETS, alignments_differ, canonical_key_type, hash_is_digest, key_type
+from .layout import Encoding, encapsulations
+from .model import ArrayType, Extensibility, IdlType, SequenceType, StructType, reachable_structs
+from .read_source import generate_reader
+from .value_check import check_sample
+from .write_source import generate_writer
+
+__all__ = ["Octets", "TypeSupport", "type_support"]
+
+T = TypeVar("T")
+
+Octets = bytes | bytearray | memoryview
+
+XCDR1, XCDR2 = DataRepresentationId.XCDR1, DataRepresentationId.XCDR2
+
+_CANONICAL = Encoding(XCDR2, little_endian=False)
+_CANONICAL_HEADER = _CANONICAL.encapsulation_id(Extensibility.FINAL) + bytes(2)
+
+_VIEW_FROM = 4096
+"""A memoryview of fewer octets is copied first: bytes are read faster."""
+
+
+def type_support(python_class: type[T]) -> TypeSupport[T]:
+    """The :class:`TypeSupport` of a class decorated with ``idl.struct``; the same object every time.
+
+    Raises BadParameter if the class is not one, or cannot be a topic type (with member and reason).
+    """
+    struct = struct_type(python_class)
+    found: TypeSupport[T] | None = python_class.__dict__.get(_ATTRIBUTE)
+    if found is None:
+        found = TypeSupport(python_class, struct)
+        setattr(python_class, _ATTRIBUTE, found)
+    return found
+
+
+_ATTRIBUTE = "__idl_support__"
+"""Where a class keeps its TypeSupport; looked for in the class itself, never in its bases."""
+
+
+class TypeSupport(Generic[T]):
+    """The codecs and the key of one type.
+
+    ``key``: in this program an instance is identified by the *canonical key*, the key members in the order of
+    their ids as a final type in XCDR2, big endian; ``b""`` for a type without key.
+    """
+
+    deserialize: Callable[[Octets], T]
+    """The sample in a payload that begins with its encapsulation header; any encapsulation that fits the type.
+    Values are copies.  Raises MalformedSample, nothing else."""
+
+    key: Callable[[T], bytes]
+    """The canonical key of a sample.  Raises BadParameter if a key member does not fit its type."""
+
+    key_from_payload: Callable[[Octets], bytes]
+    """The canonical key in a whole sample's payload, read no further than needed.  Raises MalformedSample."""
+
+    def __init__(self, python_class: type[T], struct: StructType) -> None:
+        self.python_class = python_class
+        self.struct = struct
+        self.type_name: str = struct.type_name
+        self.extensibility: Extensibility = struct.extensibility
+        self.representations: tuple[DataRepresentationId, ...] = _representations(_resolved(struct))
+        self._sources: dict[str, str] = {}
+        self._writers: dict[tuple[StructType, Encoding, bool], Callable[[Any], bytes]] = {}
+        key, canonical = key_type(struct), canonical_key_type(struct)
+        self.is_keyed: bool = canonical is not None
+        self.deserialize = self._reader(struct)
+        if key is None or canonical is None:
+            self._key_struct = self._canonical = None
+            self.key = self.key_from_payload = _no_key
+            return
+        self._key_struct, self._canonical = key, canonical
+        self._read_key_payload = self._reader(key)
+        self._read_canonical = self._reader(canonical)
+        self.key = self._checked(self._generate_writer(canonical, _CANONICAL, header=False, padded=False))
+        self.key_from_payload = self._key_extractor(struct, canonical)
+
+    def __repr__(self) -> str:
+        keyed = "keyed" if self.is_keyed else "keyless"
+        return f"<TypeSupport {self.type_name} {self.extensibility.value}, {keyed}>"
+
+    @property
+    def source(self) -> str:
+        """The Python source generated so far, for readers and debuggers."""
+        return "\n\n".join(self._sources.values())
+
+    # --- samples -----------------------------------------------------------------------------------------
+
+    def serializer(
+        self, representation: DataRepresentationId, little_endian: bool = True, *, padded: bool = True
+    ) -> Callable[[T], bytes]:
+        """The function from a sample to its payload, which begins with the 4 octets of encapsulation header.
+
+        In XCDR2 the payload is filled up with zeros to a multiple of 4, and the header's options count them
+        (unless not ``padded``).  The function raises BadParameter, naming the member, for an unfit value.
+        """
+        encoding = Encoding(_checked_representation(representation), little_endian)
+        return self._serializer(self.struct, encoding, padded=padded and encoding.is_xcdr2)
+
+    # --- keys --------------------------------------------------------------------------------------------
+
+    def key_serializer(
+        self, representation: DataRepresentationId, little_endian: bool = True, *, padded: bool = True
+    ) -> Callable[[T], bytes]:
+        """The function from a sample to a key-only payload (RTPS 2.5 §9.4.5.4, K flag), with its header.
+
+        For a type without key the payload is the header alone.
+        """
+        encoding = Encoding(_checked_representation(representation), little_endian)
+        if self._key_struct is None:
+            header = encoding.encapsulation_id(self.extensibility) + bytes(2)
+            return lambda sample: header
+        return self._serializer(self._key_struct, encoding, padded=padded and encoding.is_xcdr2)
+
+    def deserialize_key(self, octets: Octets) -> T:
+        """A sample with the key of a key-only payload, and the type's defaults elsewhere.  MalformedSample."""
+        if self._key_struct is None:
+            raise MalformedSample(f"{self.type_name}: a key, for a type that has none")
+        sample: T = self._read_key_payload(octets)
+        return sample
+
+    def sample_from_key(self, key: bytes) -> T:
+        """A sample with this canonical key, and the type's defaults elsewhere.  MalformedSample if it is none."""
+        if self._canonical is None:
+            raise MalformedSample(f"{self.type_name}: a key, for a type that has none")
+        sample: T = self._read_canonical(_CANONICAL_HEADER + key)
+        return sample
+
+    def key_from_key_payload(self, octets: Octets) -> bytes:
+        """The canonical key in a key-only payload.  Raises MalformedSample."""
+        if self._key_struct is None:
+            return b""
+        return self._key_of(self._read_key_payload(octets))
+
+    def key_hash(self, key: bytes, representation: DataRepresentationId) -> bytes:
+        """The 16 octets of the key hash that a writer with this representation gives (RTPS 2.5 §9.6.4.8).
+
+        ``key`` is canonical; for a type without key the hash is zeros.
+        """
+        if self._canonical is None:
+            return bytes(KEY_HASH_OCTETS)
+        encoding = Encoding(_checked_representation(representation), little_endian=False)
+        octets = key
+        if not encoding.is_xcdr2 and alignments_differ(self._canonical):
+            sample = self._read_canonical(_CANONICAL_HEADER + key)
+            octets = self._generate_writer(self._canonical, encoding, header=False, padded=False)(sample)
+        if hash_is_digest(self.struct, self._canonical, encoding):
+            return hashlib.md5(octets, usedforsecurity=False).digest()
+        return octets.ljust(KEY_HASH_OCTETS, b"\0")
+
+    def key_from_key_hash(self, key_hash: bytes, representation: DataRepresentationId | None = None) -> bytes | None:
+        """The canonical key, where a key hash holds the key itself; None where it is a digest or no such key.
+
+        ``representation`` is that of the writer (default: what a writer of this type uses by default); it matters
+        for keys with members of 8 octets only.
+        """
+        if self._canonical is None or len(key_hash) != KEY_HASH_OCTETS:
+            return None
+        representation = self.representations[0] if representation is None else representation
+        encoding = Encoding(_checked_representation(representation), little_endian=False)
+        if hash_is_digest(self.struct, self._canonical, encoding):
+            return None
+        header = encoding.encapsulation_id(Extensibility.FINAL) + bytes(2)
+        for length in range(1, KEY_HASH_OCTETS + 1):
+            if any(key_hash[length:]):
+                continue  # what follows the key is zeros
+            try:
+                key = self._key_of(self._read_canonical(header + key_hash[:length]))
+            except MalformedSample:
+                continue
+            if self.key_hash(key, representation) == key_hash:
+                return key
+        return None
+
+    # --- making codecs -----------------------------------------------------------------------------------
+
+    def _serializer(self, struct: StructType, encoding: Encoding, *, padded: bool) -> Callable[[Any], bytes]:
+        cached = self._writers.get((struct, encoding, padded))
+        if cached is None:
+            cached = self._checked(self._generate_writer(struct, encoding, header=True, padded=padded))
+            self._writers[struct, encoding, padded] = cached
+        return cached
+
+    def _generate_writer(
+        self, struct: StructType, encoding: Encoding, *, header: bool, padded: bool
+    ) -> Callable[[Any], bytes]:
+        write, text = generate_writer(struct, encoding, header=header, padded=padded)
+        self._sources[text.split("\n", 1)[0] + f"{header}{padded}{id(struct)}"] = text
+        return write
+
+    def _checked(self, write: Callable[[Any], bytes]) -> Callable[[T], bytes]:
+        """Let ``write`` fail, and then find out why."""
+        struct, python_class, name = self.struct, self.python_class, self.type_name
+
+        def serialize(sample: T) -> bytes:
+            try:
+                if sample.__class__ is not python_class and not isinstance(sample, python_class):
+                    raise TypeError
+                return write(sample)
+            except Exception as error:
+                check_sample(struct, sample)
+                raise BadParameter(f"{name}: the sample cannot be written: {error}") from error
+
+        return serialize
+
+    def _reader(self, struct: StructType) -> Callable[[Octets], Any]:
+        """The straight reader of each encapsulation, generated when such a payload first comes."""
+        readers: dict[bytes, Callable[[Any], Any]] = {}
+        view_readers: dict[bytes, Callable[[Any], Any]] = {}
+        for identifier, encoding in encapsulations(struct.extensibility).items():
+            self._install_lazily(readers, identifier, struct, encoding, view=False)
+            self._install_lazily(view_readers, identifier, struct, encoding, view=True)
+
+        def deserialize(octets: Octets) -> Any:
+            try:
+                if octets.__class__ is bytes:
+                    return readers[octets[:2]](octets)
+                if len(octets) < _VIEW_FROM:
+                    octets = bytes(octets)
+                    return readers[octets[:2]](octets)
+                octets = memoryview(octets)
+                return view_readers[bytes(octets[:2])](octets)
+            except Exception:
+                # Whatever the straight reader did not expect: another valid form, or octets that mean nothing.
+                return read_carefully(struct, octets)
+
+        return deserialize
+
+    def _install_lazily(
+        self,
+        readers: dict[bytes, Callable[[Any], Any]],
+        identifier: bytes,
+        struct: StructType,
+        encoding: Encoding,
+        *,
+        view: bool,
+    ) -> None:
+        def generate_first(octets: Any) -> Any:
+            read, text = generate_reader(struct, encoding, view=view)
+            self._sources[text.split("\n", 1)[0] + str(id(struct))] = text
+            readers[identifier] = read
+            return read(octets)
+
+        readers[identifier] = generate_first
+
+    def _key_of(self, sample: Any) -> bytes:
+        try:
+            return self.key(sample)
+        except BadParameter as error:
+            raise MalformedSample(f"{error}") from None
+
+    def _key_extractor(self, struct: StructType, canonical: StructType) -> Callable[[Octets], bytes]:
+        extractors: dict[bytes, Callable[[Any], bytes]] = {}
+        for identifier, encoding in encapsulations(struct.extensibility).items():
+            generated = generate_key_extractor(struct, canonical, encoding)
+            if generated is not None:
+                extractors[identifier], text = generated
+                self._sources[text.split("\n", 1)[0]] = text
+        deserialize, key_of = self.deserialize, self._key_of
+
+        def key_from_payload(octets: Octets) -> bytes:
+            try:
+                return extractors[bytes(octets[:2])](octets)
+            except Exception:
+                return key_of(deserialize(octets))
+
+        return key_from_payload
+
+
+def _no_key(_: Any) -> bytes:
+    return b""
+
+
+def _checked_representation(representation: Any) -> DataRepresentationId:
+    if representation in (XCDR1, XCDR2):
+        return DataRepresentationId(representation)
+    raise BadParameter(f"the representation is XCDR1 or XCDR2, not {representation!r}")
+
+
+def _resolved(struct: StructType) -> StructType:
+    """The struct with all its members found, and checked for what one class alone cannot show."""
+    try:
+        for inner in reachable_structs(struct):
+            _refuse_endless(inner)
+    except NameError as error:
+        raise BadParameter(f"{struct.type_name}: an annotation cannot be resolved: {error}") from error
+    return struct
+
+
+def _refuse_endless(struct: StructType) -> None:
+    """A struct that holds itself by value has no finite sample."""
+    pending = [struct]
+    seen: set[int] = set()
+    while pending:
+        candidate = pending.pop()
+        for member in candidate.members:
+            type_: IdlType = member.type
+            while isinstance(type_, ArrayType):
+                type_ = type_.element
+            if member.is_optional or not isinstance(type_, StructType):
+                continue
+            if type_ is struct:
+                raise BadParameter(
+                    f"{candidate.python_class.__name__}.{member.name}: {struct.type_name} would contain itself without"
+                    " end; put it in a sequence, or make it optional"
+                )
+            if id(type_) not in seen:
+                seen.add(id(type_))
+                pending.append(type_)
+
+
+def _representations(struct: StructType) -> tuple[DataRepresentationId, ...]:
+    """What the type can be sent in; a writer's default first.
+
+    XCDR1 reaches every vendor, but cannot delimit an appendable type inside another, and its forms of optional and
+    mutable differ between vendors: there XCDR2 comes first.
+    """
+    structs = list(itertools.islice(reachable_structs(struct), 4096))
+    prefers_xcdr2 = any(
+        inner.extensibility is Extensibility.MUTABLE
+        or any(member.is_optional for member in inner.members)
+        or (inner.extensibility is Extensibility.APPENDABLE and inner is not struct)
+        for inner in structs
+    ) or any(inner is struct for outer in structs for member in outer.members for inner in _elements(member.type))
+    return (XCDR2, XCDR1) if prefers_xcdr2 else (XCDR1, XCDR2)
+
+
+def _elements(type_: IdlType) -> list[StructType]:
+    while isinstance(type_, (SequenceType, ArrayType)):
+        type_ = type_.element
+    return [type_] if isinstance(type_, StructType) else []

@@ -1,0 +1,206 @@
+"""Say which member of a sample does not fit its type, and why.
+
+Generated serialisers are fast because they let :mod:`struct` and Python itself refuse unfit values.  What those say
+("required argument is not an integer") names no member, so on any exception this walk looks for the culprit, at
+leisure.  It reports the first in declaration order as ``BadParameter("pose.position.x: ...")``.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import struct
+from typing import Any
+
+from ..structure.errors import BadParameter
+from .buffers import flatten, octets
+from .model import (
+    BOOLEAN,
+    ArrayType,
+    BitmaskType,
+    EnumType,
+    IdlType,
+    Member,
+    Primitive,
+    SequenceType,
+    String,
+    StructType,
+)
+
+__all__ = ["check_sample", "check_value"]
+
+
+def check_sample(type_: StructType, sample: Any) -> None:
+    """Raise BadParameter for the first member that cannot be written; return if all is well."""
+    if not isinstance(sample, type_.python_class):
+        raise BadParameter(f"{type_.type_name}: a {type(sample).__name__} was given for a {_name(type_)}")
+    for member in type_.members:
+        check_value(member, _attribute(sample, member, ""), member.name)
+
+
+def check_value(member: Member, value: Any, path: str, *, depth: int = 0) -> None:
+    """Raise BadParameter, beginning with ``path``, unless ``value`` fits the member."""
+    if value is None and member.is_optional:
+        return
+    _check(member.type, value, path, depth)
+
+
+def _check(type_: IdlType, value: Any, path: str, depth: int) -> None:
+    match type_:
+        case Primitive():
+            _check_primitive(type_, value, path)
+        case String():
+            _check_string(type_, value, path)
+        case EnumType():
+            _check_enum(type_, value, path)
+        case BitmaskType():
+            _check_integer(type_.code, type_.size, value, path, f"flags of {type_.type_name}")
+        case SequenceType():
+            _check_sequence(type_, value, path, depth)
+        case ArrayType():
+            _check_array(type_, value, path, depth)
+        case StructType():
+            _check_struct(type_, value, path, depth)
+
+
+def _check_primitive(type_: Primitive, value: Any, path: str) -> None:
+    if type_ == BOOLEAN:
+        if value not in (True, False):
+            raise BadParameter(f"{path}: {_shown(value)} is no boolean")
+    elif type_.name in ("char", "wchar"):
+        limit = 256**type_.size
+        if not isinstance(value, str) or len(value) != 1 or ord(value) >= limit:
+            raise BadParameter(f"{path}: {_shown(value)} is no {type_}: one character up to {chr(limit - 1)!r}")
+    elif type_.code in "fd":
+        try:
+            struct.pack(f"<{type_.code}", value)
+        except OverflowError:
+            raise BadParameter(f"{path}: {_shown(value)} is too large for a {type_}") from None
+        except (struct.error, TypeError):
+            raise BadParameter(f"{path}: {_shown(value)} is no number, as {type_} needs") from None
+    else:
+        _check_integer(type_.code, type_.size, value, path, str(type_))
+
+
+def _check_integer(code: str, size: int, value: Any, path: str, name: str) -> None:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise BadParameter(f"{path}: {_shown(value)} is no integer, as {name} needs") from None
+    bits = 8 * size
+    lowest, highest = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if code.islower() else (0, 2**bits - 1)
+    if not lowest <= number <= highest:
+        raise BadParameter(f"{path}: {number} does not fit {name} ({lowest} to {highest})")
+
+
+def _check_string(type_: String, value: Any, path: str) -> None:
+    if not isinstance(value, str):
+        raise BadParameter(f"{path}: {_shown(value)} is no string")
+    try:
+        encoded = value.encode()
+    except UnicodeEncodeError as error:
+        raise BadParameter(f"{path}: {_shown(value)} has no UTF-8 form ({error.reason})") from None
+    if 0 in encoded:
+        raise BadParameter(f"{path}: {_shown(value)} contains a NUL, which ends a string on the wire")
+    if type_.bound is not None and len(encoded) > type_.bound:
+        raise BadParameter(f"{path}: a string of {len(encoded)} octets exceeds its bound of {type_.bound}")
+
+
+def _check_enum(type_: EnumType, value: Any, path: str) -> None:
+    try:
+        type_.python_class(value)
+    except ValueError:
+        names = ", ".join(literal.name for literal in list(type_.python_class)[:8])
+        raise BadParameter(f"{path}: {_shown(value)} is no literal of {type_.type_name} ({names})") from None
+
+
+def _check_sequence(type_: SequenceType, value: Any, path: str, depth: int) -> None:
+    count = _count(type_, value, path)
+    if type_.bound is not None and count > type_.bound:
+        raise BadParameter(f"{path}: {count} elements exceed the bound of {type_.bound}")
+    _check_elements(type_.element, value, path, depth)
+
+
+def _check_array(type_: ArrayType, value: Any, path: str, depth: int) -> None:
+    _count(type_, value, path)
+    try:
+        flat = flatten(value, type_.dimensions)
+        fits = type_.count == (memoryview(flat).nbytes // _itemsize(flat) if _is_buffer(flat) else len(flat))
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        raise BadParameter(f"{path}: {_shape(value)} elements where the array has {_times(type_.dimensions)}")
+    _check_elements(type_.element, flat, path, depth)
+
+
+def _count(type_: SequenceType | ArrayType, value: Any, path: str) -> int:
+    characters = isinstance(type_.element, Primitive) and type_.element.name in ("char", "wchar")
+    if not hasattr(value, "__len__") or not hasattr(value, "__getitem__") or isinstance(value, dict):
+        raise BadParameter(f"{path}: {_shown(value)} is no sequence of {type_.element}")
+    if isinstance(value, str) and not characters:
+        raise BadParameter(f"{path}: {_shown(value)} is a string, not a sequence of {type_.element}")
+    if isinstance(type_.element, Primitive) and type_.element.is_octet and _is_buffer(value):
+        return memoryview(value).nbytes
+    return len(value)
+
+
+def _check_elements(element: IdlType, value: Any, path: str, depth: int) -> None:
+    if isinstance(element, Primitive) and element.is_octet:
+        try:
+            octets(value)
+            return
+        except (TypeError, ValueError):
+            pass  # say which element below
+    if isinstance(element, Primitive) and element.is_number and _is_buffer(value):
+        view = memoryview(value)
+        if not view.c_contiguous or view.format not in "bBhHiIlLqQfd":
+            raise BadParameter(f"{path}: a buffer of format {view.format!r} does not hold {element}")
+    for index, item in enumerate(value.tolist() if hasattr(value, "tolist") else value):
+        _check(element, item, f"{path}[{index}]", depth)
+
+
+def _check_struct(type_: StructType, value: Any, path: str, depth: int) -> None:
+    if not isinstance(value, type_.python_class):
+        raise BadParameter(f"{path}: {_shown(value)} is no {_name(type_)}")
+    if depth >= StructType.MAX_DEPTH:
+        raise BadParameter(f"{path}: structs are nested deeper than {StructType.MAX_DEPTH}")
+    for member in type_.members:
+        inner = f"{path}.{member.name}"
+        check_value(member, _attribute(value, member, path), inner, depth=depth + 1)
+
+
+def _attribute(value: Any, member: Member, path: str) -> Any:
+    try:
+        return getattr(value, member.name)
+    except AttributeError:
+        raise BadParameter(f"{path}{'.' if path else ''}{member.name}: it was never set") from None
+
+
+def _is_buffer(value: Any) -> bool:
+    try:
+        memoryview(value)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _itemsize(value: Any) -> int:
+    return memoryview(value).itemsize
+
+
+def _shape(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    return _times(shape) if shape else str(len(value))
+
+
+def _times(dimensions: tuple[int, ...]) -> str:
+    return "x".join(map(str, dimensions)) if math.prod(dimensions) else "0"
+
+
+def _name(type_: StructType) -> str:
+    return type_.python_class.__name__
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:76]}..."
