@@ -10,6 +10,14 @@ import pytest
 from .framework import Unavailable
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--all-peers",
+        action="store_true",
+        help="play every case with every pair of peers, not the quick ones with ours",
+    )
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
     yield from _judge_what_is_missing()

@@ -63,9 +63,9 @@ class Capture:
         rows = self.fields(bad, "frame.number", "frame.protocols", "_ws.expert.message")
         return [" ".join(f"{name}={','.join(values)}" for name, values in row.items()) for row in rows]
 
-    def marks(self, display_filter: str, pattern: str) -> list[str]:
+    def marks(self, display_filter: str, pattern: str, flags: int = 0) -> list[str]:
         """Distinct lines of the dissection that ``pattern`` is found in, in order of appearance."""
-        expression = re.compile(pattern)
+        expression = re.compile(pattern, flags)
         lines = (line.strip() for line in self.dissection(display_filter).splitlines())
         return list(dict.fromkeys(line for line in lines if expression.search(line)))
 

@@ -85,11 +85,10 @@ class Process:
                 if found := self._advance(expression):
                     return found
                 if self._is_silent_for_good:
-                    raise ExpectationFailed(
-                        f"{self.name} ended with status {self.returncode} and never printed {pattern!r}"
-                    )
+                    end = f"{self.name} ended with status {self.returncode}"
+                    raise ExpectationFailed(f"{end} and never printed {pattern!r}{self._last_words()}")
                 await self._changed.wait()
-        raise ExpectationFailed(f"{self.name} did not print {pattern!r} within {timeout:g} s")
+        raise ExpectationFailed(f"{self.name} did not print {pattern!r} within {timeout:g} s{self._last_words()}")
 
     def matches(self, pattern: str) -> list[re.Match[str]]:
         """All lines of standard output so far that ``pattern`` matches from end to end, in order."""
@@ -103,6 +102,10 @@ class Process:
             if line.stream == "out" and (found := expression.fullmatch(line.text)):
                 return found
         return None
+
+    def _last_words(self) -> str:
+        printed = [line.text for line in self.lines if line.stream == "out"]
+        return f"; its last line was {printed[-1][:200]!r}" if printed else "; it printed nothing"
 
     # --- what it is told ---------------------------------------------------------------------------------
 

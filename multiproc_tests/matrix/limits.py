@@ -1,0 +1,80 @@
+"""What implementations of others cannot do, with each other or with anybody: failures that are expected and explained.
+
+A run that fails in such a way is reported as a known limit; one that passes is reported as passed, so that an entry
+that is out of date does no harm.  Nothing of ours belongs here but for what the other side alone is to blame for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["known_limit"]
+
+CYCLONES = frozenset({"cyclone", "cyclone11"})
+FASTDDS = frozenset({"fastdds"})
+DUST = frozenset({"dust"})
+FOREIGN = CYCLONES | FASTDDS | DUST
+
+
+@dataclass(frozen=True, slots=True)
+class _Limit:
+    cases: frozenset[str]
+    publishers: frozenset[str]
+    subscribers: frozenset[str]
+    reason: str
+
+
+_LIMITS = (
+    _Limit(
+        frozenset({"keyed-dispose", "keyed-unregister"}),
+        FASTDDS,
+        CYCLONES,
+        "Fast DDS sends the key hash and no key; Cyclone cannot get a key out of an MD5",
+    ),
+    _Limit(
+        frozenset({"short-key-dispose", "fragments-keyed"}),
+        FASTDDS,
+        frozenset({"cyclone11"}),
+        "Fast DDS sends the key hash and no key; Cyclone 11 takes every hash for an MD5",
+    ),
+    _Limit(
+        frozenset({"keyed-dispose", "keyed-unregister", "short-key-dispose", "fragments-keyed"}),
+        CYCLONES,
+        FASTDDS,
+        "Cyclone sends the key and no key hash; Fast DDS takes the first 16 octets of the payload for the hash",
+    ),
+    _Limit(
+        frozenset({"goodbye"}),
+        CYCLONES,
+        FASTDDS | DUST,
+        "Cyclone sends its last words without a key hash, and without it they are not understood",
+    ),
+    _Limit(
+        frozenset({"appendable-xcdr2-dispose"}),
+        CYCLONES,
+        CYCLONES,
+        "0.10 writes the key of an appendable type without a delimiter header, 11 with it",
+    ),
+    _Limit(
+        frozenset({"fragments", "fragments-late"}),
+        FOREIGN,
+        DUST,
+        'Dust DDS fails ("index out of bounds") when more than 256 fragments of a sample are missing, and does not '
+        "recover from the loss of larger ones",
+    ),
+    _Limit(
+        frozenset({"fragments-late"}),
+        DUST,
+        FOREIGN,
+        "Dust DDS does not send again what went out in fragments",
+    ),
+    _Limit(frozenset({"burst"}), DUST, DUST, "Dust DDS does not repair all that a full socket buffer loses"),
+)
+
+
+def known_limit(case: str, publisher: str, subscriber: str) -> str | None:
+    """Why this combination is expected to fail, or None."""
+    for limit in _LIMITS:
+        if case in limit.cases and publisher in limit.publishers and subscriber in limit.subscribers:
+            return limit.reason
+    return None

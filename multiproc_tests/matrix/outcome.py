@@ -1,0 +1,78 @@
+"""Running one case with two peers in a namespace of its own, and how that ended."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from enum import Enum
+
+from ..framework import DeadlineExceeded, ExpectationFailed, Unavailable, namespace, scenario
+from ..peers.peer import Peer
+from .cases import Case
+from .limits import known_limit
+from .stories import Cast
+
+__all__ = ["Outcome", "Verdict", "missing_ability", "play", "run_case"]
+
+CASE_DEADLINE = 60.0
+
+
+class Verdict(Enum):
+    """How a case ended; KNOWN is a failure that others have and that is explained (``limits.py``)."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    KNOWN = "known limit"
+    NOT_APPLICABLE = "not applicable"
+    UNAVAILABLE = "unavailable"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """``reason`` is one line for everything but PASSED; ``transcript`` all that both processes said, of a failure."""
+
+    case: str
+    publisher: str
+    subscriber: str
+    verdict: Verdict
+    seconds: float = 0.0
+    reason: str = ""
+    transcript: str = ""
+
+
+def missing_ability(case: Case, *peers: Peer) -> str | None:
+    """Why these peers cannot play the case, or None if they can."""
+    for peer in peers:
+        missing = sorted(need.value for need in case.needs - peer.abilities)
+        if missing:
+            return f"{peer.name} has no {', '.join(missing)}"
+    return None
+
+
+async def play(case: Case, publisher: Peer, subscriber: Peer) -> None:
+    """Plays the case; raises what went wrong, with the transcript as a note, or Unavailable."""
+    publisher.locate()  # compiled before the clock runs
+    subscriber.locate()
+    with namespace() as host:
+        async with scenario(f"{case.name} {publisher}-{subscriber}", deadline=CASE_DEADLINE) as stage:
+            options = case.publisher_options(), case.subscriber_options()
+            await case.story(Cast(stage, host, host, publisher, subscriber, *options))
+
+
+async def run_case(case: Case, publisher: Peer, subscriber: Peer) -> Outcome:
+    """Plays the case and judges; never raises for what the peers do."""
+    who = (case.name, publisher.name, subscriber.name)
+    if reason := missing_ability(case, publisher, subscriber):
+        return Outcome(*who, Verdict.NOT_APPLICABLE, reason=reason)
+    began = time.monotonic()
+    try:
+        await play(case, publisher, subscriber)
+    except Unavailable as error:
+        return Outcome(*who, Verdict.UNAVAILABLE, reason=str(error))
+    except (ExpectationFailed, DeadlineExceeded) as error:
+        seconds = time.monotonic() - began
+        transcript = "\n".join(getattr(error, "__notes__", []))
+        if known := known_limit(*who):
+            return Outcome(*who, Verdict.KNOWN, seconds, known, transcript)
+        return Outcome(*who, Verdict.FAILED, seconds, str(error), transcript)
+    return Outcome(*who, Verdict.PASSED, time.monotonic() - began)

@@ -1,0 +1,58 @@
+"""The command line of the peer programs as a value.  ``docs/multiproc.md`` has the meaning of each option."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Options"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What a peer program is told; the defaults suit a test (short waits, held until released)."""
+
+    domain: int = 1
+    topic: str = "Square"
+    colors: tuple[str, ...] = ("BLUE",)
+    count: int = 5
+    interval_ms: int = 10
+    wait_s: int = 15
+    size: int = 30
+    depth: int = 0
+    representation: int = 1
+    partitions: tuple[str, ...] = ()
+    blob_octets: int | None = None
+    readers: int = 1
+    best_effort: bool = False
+    volatile: bool = False
+    dispose: bool = False
+    unregister: bool = False
+    keyless: bool = False
+    appendable: bool = False
+    unicast: bool = False
+    gate: bool = False
+    hold: bool = True
+
+    def arguments(self) -> list[str]:
+        """The options as words, without the role."""
+        words = ["-d", str(self.domain), "-t", self.topic, "-c", ",".join(self.colors), "-n", str(self.count)]
+        words += ["-i", str(self.interval_ms), "-w", str(self.wait_s), "-s", str(self.size)]
+        words += ["-x", str(self.representation), "-M", str(self.readers)]
+        if self.depth:
+            words += ["-h", str(self.depth)]
+        if self.partitions:
+            words += ["-P", ",".join(self.partitions)]
+        if self.blob_octets is not None:
+            words += ["-B", str(self.blob_octets)]
+        flags = {
+            "-b": self.best_effort,
+            "-v": self.volatile,
+            "-D": self.dispose,
+            "-U": self.unregister,
+            "-K": self.keyless,
+            "-A": self.appendable,
+            "-u": self.unicast,
+            "-G": self.gate,
+            "-H": self.hold,
+        }
+        return words + [flag for flag, is_set in flags.items() if is_set]
