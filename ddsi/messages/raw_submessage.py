@@ -28,7 +28,7 @@ LITTLE_ENDIAN = 0x01
 
 
 class SubmessageKind(IntEnum):
-    """SubmessageKind, RTPS 2.5 §9.4.5.1.1 and DDS-Security 1.1 §7.3.6.2; from 0x80 on the numbers are the vendors'."""
+    """SubmessageKind, RTPS 2.5 §9.4.5.1.1 and DDS-Security 1.1 §7.3.6; from 0x80 on the numbers are the vendors'."""
 
     HEADER_EXTENSION = 0x00
     PAD = 0x01

@@ -106,7 +106,7 @@ class Reader:
         return self._octets[self._advance(1)]
 
     def boolean(self) -> bool:
-        """One octet, 0 or 1 (DDS-XTypes 1.3 §7.4.1.1.1); anything else is malformed."""
+        """One octet, 0 or 1; anything else is malformed."""
         value = self._octets[self._advance(1)]
         if value > 1:
             raise self.malformed(f"a boolean is 0 or 1, not {value}")

@@ -1,4 +1,4 @@
-"""The ids of parameters: RTPS 2.5 §9.6.4 (table 9.18 and following), DDS-XTypes 1.3 §7.6.3, DDS-Security 1.1 §7.4.1.
+"""The ids of parameters: RTPS 2.5 §9.6.4, DDS-XTypes 1.3 §7.6.3, DDS-Security 1.1 §7.4.1.
 
 The two high bits are part of the id and say how a receiver that does not know it behaves:
 :data:`VENDOR_SPECIFIC` and :data:`MUST_UNDERSTAND`.  Ids are compared whole: 0x4005 is not TOPIC_NAME.
@@ -89,7 +89,7 @@ class ParameterId(IntEnum):
     TYPE_CONSISTENCY = 0x0074  # uint16 kind, 5 x boolean
     TYPE_INFORMATION = 0x0075  # TypeInformation in XCDR2, without encapsulation header
     BUILTIN_ENDPOINT_QOS = 0x0077  # uint32
-    SERVICE_INSTANCE_NAME = 0x0080  # string; DDS-RPC 1.0 §7.8.2
+    SERVICE_INSTANCE_NAME = 0x0080  # string; DDS-RPC 1.0
     RELATED_ENTITY_GUID = 0x0081  # Guid; DDS-RPC
     TOPIC_ALIASES = 0x0082  # sequence<string>; DDS-RPC
     RELATED_SAMPLE_IDENTITY = 0x0083  # Guid, SequenceNumber; DDS-RPC

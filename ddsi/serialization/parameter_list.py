@@ -32,6 +32,7 @@ UNDERSTOOD_PARAMETERS: frozenset[int] = frozenset(int(pid) for pid in ParameterI
 """The ids that this stack knows: a list with another that must be understood is not used."""
 
 _HEADERS = {True: struct.Struct("<HH"), False: struct.Struct(">HH")}
+_PAD, _SENTINEL = int(ParameterId.PAD), int(ParameterId.SENTINEL)
 _MAX_VALUE = 0xFFFC  # the largest multiple of 4 that the length field holds
 
 
@@ -124,7 +125,7 @@ class ParameterList:
             buffer += header.pack(pid, len(value) + padding)
             buffer += value
             buffer += bytes(padding)
-        buffer += header.pack(ParameterId.SENTINEL, 0)
+        buffer += header.pack(_SENTINEL, 0)
         return bytes(buffer)
 
     @classmethod
@@ -148,12 +149,12 @@ class ParameterList:
                 raise MalformedMessage("no sentinel", element="ParameterList", offset=position)
             pid, length = unpack(view, position)
             position += 4
-            if pid == ParameterId.SENTINEL:
+            if pid == _SENTINEL:
                 break
             if end - position < length:
                 reason = f"{parameter_name(pid)} has {length} octets, {end - position} are left"
                 raise MalformedMessage(reason, element="ParameterList", offset=position)
-            if pid != ParameterId.PAD:
+            if pid != _PAD:
                 if len(parameters) == MAX_PARAMETERS:
                     raise MalformedMessage(
                         f"over {MAX_PARAMETERS} parameters", element="ParameterList", offset=position

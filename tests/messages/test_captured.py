@@ -110,7 +110,7 @@ def sample_line(type_name: str, payload: bytes | bytearray | memoryview) -> str:
 
 @pytest.mark.parametrize("name", SECURED)
 def test_envelopes_come_in_their_order(name: str) -> None:
-    """DDS-Security 1.1 §7.3.6.2: PREFIX, one submessage, POSTFIX; SRTPS_PREFIX is first and its POSTFIX last, but
+    """DDS-Security 1.1 §7.3.6: PREFIX, one submessage, POSTFIX; SRTPS_PREFIX is first and its POSTFIX last, but
     for what Fast DDS adds behind it."""
     counts = load(name).facts["counts"]
     seen: Counter[str] = Counter()
