@@ -1,1 +1,203 @@
-"""A complete RTPS/DDSI stack in pure Python."""
+"""ddsi: a complete RTPS/DDSI stack in pure Python, with OMG DDS Security built in.
+
+General layout, top to bottom; a room imports only rooms above it, never this package itself
+(``tests/test_layering.py`` holds the code to it):
+
+    structure      values: Guid, Locator, SequenceNumber, Time, CacheChange, QoS        RTPS 8.2
+    serialization  bounded cursors, encapsulation, parameter lists                      RTPS 10
+    xtypes         types, generated codecs, keys                                        DDS-XTypes
+    config         Config and DDSI_URI
+    messages       datagrams to submessages and back                                    RTPS 8.3
+    trace          what the engine does, as events, and their rendering
+    spi            the seam to security
+    behavior       writers, readers, caches, order and repair                           RTPS 8.4
+    discovery      SPDP, SEDP, matching                                                 RTPS 8.5
+    engine         the participant as one machine without I/O
+    transport      sockets, clock, trio                  simulation   the same engine over a virtual network
+    dcps           what applications hold                                               DDS 1.4
+    cli            the ``ddsi`` command
+
+The names below are the public face; everything else may change.
+"""
+
+from .config import Config
+from .dcps import (
+    DataReader,
+    DataWriter,
+    DomainParticipant,
+    Entity,
+    EventStream,
+    Publisher,
+    ReadCondition,
+    Sample,
+    Subscriber,
+    Topic,
+)
+from .structure.errors import (
+    AlreadyDeleted,
+    BadParameter,
+    ConfigurationError,
+    DdsError,
+    DdsTimeout,
+    ImmutablePolicy,
+    InconsistentPolicy,
+    MalformedSample,
+    NotAllowedBySecurity,
+    OutOfResources,
+    PreconditionNotMet,
+)
+from .structure.guid import Guid
+from .structure.qos import EndpointQos, Qos
+from .structure.qos_policies import (
+    AccessScope,
+    Automatic,
+    BestEffort,
+    BinaryProperty,
+    ByReceptionTimestamp,
+    BySourceTimestamp,
+    DataRepresentation,
+    DataRepresentationId,
+    Deadline,
+    DurabilityService,
+    EntityFactory,
+    Exclusive,
+    GroupData,
+    KeepAll,
+    KeepLast,
+    LatencyBudget,
+    Lifespan,
+    ManualByParticipant,
+    ManualByTopic,
+    OwnershipStrength,
+    Partition,
+    Persistent,
+    Presentation,
+    Property,
+    ReaderDataLifecycle,
+    Reliable,
+    ResourceLimits,
+    Shared,
+    TimeBasedFilter,
+    TopicData,
+    Transient,
+    TransientLocal,
+    TransportPriority,
+    TypeConsistency,
+    UserData,
+    Volatile,
+    WriterDataLifecycle,
+)
+from .structure.sample_info import InstanceState, SampleInfo, SampleState, ViewState
+from .structure.status import (
+    InconsistentTopic,
+    Incompatibility,
+    LivelinessChanged,
+    LivelinessLost,
+    OfferedDeadlineMissed,
+    OfferedIncompatibleQos,
+    PublicationMatched,
+    RequestedDeadlineMissed,
+    RequestedIncompatibleQos,
+    SampleLost,
+    SampleRejected,
+    SecurityRefused,
+    Status,
+    SubscriptionMatched,
+)
+from .structure.time import Time
+from .xtypes import deserialize, idl, key_hash, serialize
+
+XCDR1 = DataRepresentationId.XCDR1
+XCDR2 = DataRepresentationId.XCDR2
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "XCDR1",
+    "XCDR2",
+    "AccessScope",
+    "AlreadyDeleted",
+    "Automatic",
+    "BadParameter",
+    "BestEffort",
+    "BinaryProperty",
+    "ByReceptionTimestamp",
+    "BySourceTimestamp",
+    "Config",
+    "ConfigurationError",
+    "DataReader",
+    "DataRepresentation",
+    "DataRepresentationId",
+    "DataWriter",
+    "DdsError",
+    "DdsTimeout",
+    "Deadline",
+    "DomainParticipant",
+    "DurabilityService",
+    "EndpointQos",
+    "Entity",
+    "EntityFactory",
+    "EventStream",
+    "Exclusive",
+    "GroupData",
+    "Guid",
+    "ImmutablePolicy",
+    "InconsistentPolicy",
+    "InconsistentTopic",
+    "Incompatibility",
+    "InstanceState",
+    "KeepAll",
+    "KeepLast",
+    "LatencyBudget",
+    "Lifespan",
+    "LivelinessChanged",
+    "LivelinessLost",
+    "MalformedSample",
+    "ManualByParticipant",
+    "ManualByTopic",
+    "NotAllowedBySecurity",
+    "OfferedDeadlineMissed",
+    "OfferedIncompatibleQos",
+    "OutOfResources",
+    "OwnershipStrength",
+    "Partition",
+    "Persistent",
+    "PreconditionNotMet",
+    "Presentation",
+    "Property",
+    "PublicationMatched",
+    "Publisher",
+    "Qos",
+    "ReadCondition",
+    "ReaderDataLifecycle",
+    "Reliable",
+    "RequestedDeadlineMissed",
+    "RequestedIncompatibleQos",
+    "ResourceLimits",
+    "Sample",
+    "SampleInfo",
+    "SampleLost",
+    "SampleRejected",
+    "SampleState",
+    "SecurityRefused",
+    "Shared",
+    "Status",
+    "Subscriber",
+    "SubscriptionMatched",
+    "Time",
+    "TimeBasedFilter",
+    "Topic",
+    "TopicData",
+    "Transient",
+    "TransientLocal",
+    "TransportPriority",
+    "TypeConsistency",
+    "UserData",
+    "ViewState",
+    "Volatile",
+    "WriterDataLifecycle",
+    "deserialize",
+    "idl",
+    "key_hash",
+    "serialize",
+]

@@ -98,6 +98,7 @@ class ReaderHistoryCache:
         self._on_news = on_news
         self._on_rejected = on_rejected
         self._has_news = False
+        self.is_withholding = False  # did a reliable writer's sample find no room?
         self._instances: dict[bytes, Instance] = {}
         # In order of arrival.  What was taken from the middle or pushed out stays until it comes to the front
         # or the queue is compacted; such a sample has no change any more.
@@ -210,6 +211,7 @@ class ReaderHistoryCache:
 
     def _no_room(self, limit: str) -> bool:
         if self._is_reliable:
+            self.is_withholding = True
             return False
         self._on_rejected(limit)
         return True
@@ -301,7 +303,9 @@ class ReaderHistoryCache:
             info.sample_state = _READ
         return [(info, change) for info, change in result if change is not None]
 
-    def matches(self, sample_states: int, view_states: int, instance_states: int, selector: SampleSelector | None) -> bool:
+    def matches(
+        self, *, sample_states: int, view_states: int, instance_states: int, selector: SampleSelector | None = None
+    ) -> bool:
         """Is there any such sample?"""
         return bool(self._select(1, sample_states, view_states, instance_states, None, selector, touch=False))
 

@@ -41,6 +41,7 @@ class WriterProxy:
         "_nack_frag_count",
         "data",
         "guid",
+        "historical_sn",
         "is_alive",
         "is_local",
         "is_reliable",
@@ -76,6 +77,7 @@ class WriterProxy:
         self.reorder = ReorderBuffer(max_samples=max_samples, max_octets=max_octets)
         self.schedule = AckNackSchedule()
         self.last_seq = 0
+        self.historical_sn = -1  # what the first HEARTBEAT said is there; -1: none came yet
         self.is_alive = True
         self.liveliness_due = math.inf
         self._acknack_count = 0
@@ -93,6 +95,13 @@ class WriterProxy:
     @property
     def next_sn(self) -> int:
         return self.reorder.next_sn
+
+    @property
+    def has_historical_data(self) -> bool:
+        """Has all that the writer held when it first spoke come (or is there none to come)?"""
+        if not self.needs_historical_data or self.is_local:
+            return True
+        return self.historical_sn >= 0 and self.reorder.next_sn > self.historical_sn
 
     def available_changes_max(self) -> int:
         """The highest number such that all up to it were delivered or will never come.  RTPS 2.5 §8.4.10.4.3."""
@@ -131,6 +140,8 @@ class WriterProxy:
         knew_any = self.last_seq > 0 or self.reorder.next_sn > 1
         lost = self.reorder.skip_to(first)
         self.last_seq = max(self.last_seq, last)
+        if self.historical_sn < 0:
+            self.historical_sn = last
         if not final:
             self.schedule.acknowledge(now)
         return lost if knew_any and not was_first and not self.uses_filter else 0

@@ -79,7 +79,7 @@ class LocalWriter:
         self.liveliness = LivelinessLost()
         self.dirty_since = float("inf")
         self.assertion_due = float("inf")
-        self.wants_acknowledgment = False
+        self.wants_acknowledgment = 0  # how many wait for its progress
 
     def match_changed(self, reader: Guid, change: int) -> Status:
         """One matched reader more (+1) or less (-1)."""

@@ -206,6 +206,12 @@ class Participant:
         self._effects.clear()
         return effects
 
+    def take_finished(self) -> list[Effect]:
+        """As :meth:`drain_effects`, but messages that are not full stay open: for a burst of writes."""
+        effects = list(self._effects)
+        self._effects.clear()
+        return effects
+
     @property
     def has_effects(self) -> bool:
         """Is anything to be done at once?  Queued samples do not count until their message is full or due."""

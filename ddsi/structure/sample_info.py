@@ -82,6 +82,11 @@ class SampleInfo:
         self.absolute_generation_rank = 0
 
     @property
+    def change(self) -> CacheChange | None:
+        """For readers: the octets, while they are in the cache."""
+        return self._change
+
+    @property
     def source_timestamp(self) -> Time:
         """When the writer wrote it, by the writer's clock; the time of reception where the writer did not say."""
         return Time(self.source_ticks)

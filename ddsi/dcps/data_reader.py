@@ -1,0 +1,261 @@
+"""DataReader: reads samples of one topic.  DDS 1.4 §2.2.2.5.3 (DataReader)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import trio
+
+from ddsi.engine import KeyCodec, LocalReader
+from ddsi.behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
+from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.errors import MalformedSample, PreconditionNotMet
+from ddsi.structure.guid import Guid
+from ddsi.structure.qos import EndpointQos, Qos, reader_qos
+from ddsi.structure.qos_policies import DataRepresentation, DataRepresentationId
+from ddsi.structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
+
+from .conditions import ReadCondition
+from .entity import Entity
+from .groups import Subscriber
+from .sample import Sample
+from .topic import Topic
+
+if TYPE_CHECKING:
+    from .participant import DomainParticipant
+
+__all__ = ["DataReader"]
+
+T = TypeVar("T")
+
+_UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
+
+
+class DataReader(Entity, Generic[T]):
+    """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``, which never wait."""
+
+    def __init__(self, parent: DomainParticipant | Subscriber, topic: Topic[T], qos: Qos | None = None) -> None:
+        """``qos`` goes before the subscriber's, and that before the topic's; the rest is the OMG's default (best effort).
+
+        Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
+        """
+        group_qos = parent.qos if isinstance(parent, Subscriber) else Qos()
+        super().__init__(topic.qos | group_qos | (qos or Qos()))
+        participant = parent.participant if isinstance(parent, Subscriber) else parent
+        parent._check_open()
+        topic._check_open()
+        if topic.participant is not participant:
+            raise PreconditionNotMet(f"topic {topic.name!r} belongs to another participant")
+        self._participant = participant
+        self._topic = topic
+        support = topic.type_support
+        self._deserialize = support.deserialize
+        self._deserialize_key = support.deserialize_key
+        self._endpoint_qos = _with_representations(reader_qos(self._qos))
+        self._news = trio.lowlevel.ParkingLot()
+        self._pump = participant._running_pump()
+        self._reader: LocalReader = self._pump.engine.create_reader(
+            topic.name,
+            support.type_name,
+            self._endpoint_qos,
+            self._pump.now(),
+            is_keyed=support.is_keyed,
+            keys=_key_codec(topic) if support.is_keyed else None,
+        )
+        history = self._reader.history
+        assert history is not None
+        self._history: ReaderHistoryCache = history
+        parent._adopt(self)
+        participant._register(self._reader.guid, self)
+        self._pump.settle()
+
+    def __repr__(self) -> str:
+        return f"<DataReader of {self._topic.name!r} {self.guid}, {len(self._history)} samples>"
+
+    @property
+    def topic(self) -> Topic[T]:
+        return self._topic
+
+    @property
+    def guid(self) -> Guid:
+        return self._reader.guid
+
+    @property
+    def endpoint_qos(self) -> EndpointQos:
+        """Every policy as it holds for this reader, defaults filled in."""
+        return self._endpoint_qos
+
+    # --- reading -----------------------------------------------------------------------------------------
+
+    def __aiter__(self) -> DataReader[T]:
+        return self
+
+    async def __anext__(self) -> Sample[T]:
+        """Take the next sample, waiting for one.  Iteration ends when the reader is closed."""
+        await self._pump.checkpoint(trio.current_time())
+        while True:
+            taken = self._history.take_next()
+            if taken is not None:
+                sample = self._sample(*taken)
+                self._after_taking()
+                if sample is not None:
+                    return sample
+                continue
+            if self._is_closed:
+                raise StopAsyncIteration
+            await self._wait_for_news()
+
+    def take(
+        self,
+        max_samples: int | None = None,
+        *,
+        condition: ReadCondition | None = None,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+        instance: bytes | None = None,
+    ) -> list[Sample[T]]:
+        """Samples that are here now, oldest first, removed from the reader; never waits.
+
+        ``max_samples``: at most so many.  Masks select by state, ``condition`` brings masks of its own,
+        ``instance`` (an ``info.instance_handle``) selects one instance.
+        """
+        states, selector = self._selection(condition, sample_states, view_states, instance_states)
+        self._history.seen()
+        taken = self._history.take(max_samples, **states, instance=instance, selector=selector)
+        samples = [sample for info, change in taken if (sample := self._sample(info, change)) is not None]
+        self._after_taking()
+        return samples
+
+    def read(
+        self,
+        max_samples: int | None = None,
+        *,
+        condition: ReadCondition | None = None,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+        instance: bytes | None = None,
+    ) -> list[Sample[T]]:
+        """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
+        states, selector = self._selection(condition, sample_states, view_states, instance_states)
+        self._history.seen()
+        found = self._history.read(max_samples, **states, instance=instance, selector=selector)
+        return [sample for info, change in found if (sample := self._sample(info, change)) is not None]
+
+    async def wait(self, condition: ReadCondition | None = None) -> None:
+        """Until there is a sample that fits ``condition`` (none given: one that has not been read)."""
+        await self._pump.checkpoint(trio.current_time())
+        states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
+        while not self._history.matches(selector=selector, **states):
+            self._check_open()
+            await self._wait_for_news()
+
+    def lookup_instance(self, sample: T) -> bytes | None:
+        """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
+        key = self._topic.type_support.key(sample)
+        return key if key in self._history.instances else None
+
+    # --- waiting -----------------------------------------------------------------------------------------
+
+    async def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
+        """Until at least ``count`` writers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        await self._participant._wait_until(
+            self, lambda: self._reader.matched.current_count >= count, timeout,
+            f"reader of {self._topic.name!r} has not matched {count} writer(s)",
+        )  # fmt: skip
+
+    async def wait_for_historical_data(self, timeout: float | None = None) -> None:
+        """Until all that the matched transient-local writers held at the match has come.  Raises DdsTimeout.
+
+        DDS 1.4 §2.2.2.5.3.31.  Returns at once where no matched writer keeps history.
+        """
+        await self._participant._wait_until(
+            self, lambda: all(proxy.has_historical_data for proxy in self._reader.behavior.writers.values()), timeout,
+            f"reader of {self._topic.name!r} still lacks historical data",
+        )  # fmt: skip
+
+    def matched_publications(self) -> list[Guid]:
+        """The Guids of the writers that are matched now."""
+        return list(self._reader.behavior.writers)
+
+    # --- inside ------------------------------------------------------------------------------------------
+
+    async def _wait_for_news(self) -> None:
+        """Until something may have changed.  What this task has written must not wait meanwhile."""
+        self._history.seen()
+        self._pump.before_waiting()
+        await self._news.park()
+
+    def _has_news(self) -> None:
+        self._news.unpark_all()
+        self._changed.unpark_all()
+
+    def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
+        """The sample as an object; None, and counted as lost, if its octets are not one."""
+        try:
+            if info.valid_data:
+                return Sample(self._deserialize(change.payload), info)
+            return Sample(self._key_sample(change, info), info)
+        except MalformedSample as error:
+            self._pump.engine.sample_malformed(self._reader, change, str(error))
+            self._pump.settle()
+            return None
+
+    def _key_sample(self, change: CacheChange, info: SampleInfo) -> T:
+        if len(change.payload) >= 4:
+            return self._deserialize_key(change.payload)
+        return self._topic.type_support.sample_from_key(info.instance_handle)
+
+    def _after_taking(self) -> None:
+        """There is room again: a reliable writer whose samples had to wait may go on."""
+        if self._history.is_withholding:
+            self._history.is_withholding = False
+            self._pump.engine.samples_taken(self._reader, self._pump.now())
+            self._pump.settle()
+
+    def _selection(
+        self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int
+    ) -> tuple[dict[str, int], SampleSelector | None]:
+        selector: SampleSelector | None = None
+        if condition is not None:
+            sample_states &= condition.sample_states
+            view_states &= condition.view_states
+            instance_states &= condition.instance_states
+            query = condition.query
+            if query is not None:
+                selector = self._selector(query)
+        states = {"sample_states": sample_states, "view_states": view_states, "instance_states": instance_states}
+        return states, selector
+
+    def _selector(self, query: object) -> SampleSelector:
+        def selects(info: SampleInfo) -> bool:
+            change = info.change
+            sample = self._sample(info, change) if change is not None else None
+            return sample is not None and callable(query) and bool(query(sample.data))
+
+        return selects
+
+    def _on_close(self) -> None:
+        self._news.unpark_all()
+        self._participant._deregister(self._reader.guid)
+        self._participant._when_running(lambda pump: pump.engine.delete_reader(self._reader, pump.now()))
+
+
+def _with_representations(qos: EndpointQos) -> EndpointQos:
+    """A reader understands both, unless told to insist on one."""
+    if qos.data_representation.ids:
+        return qos
+    both = DataRepresentation(DataRepresentationId.XCDR1, DataRepresentationId.XCDR2)
+    return replace(qos, data_representation=both)
+
+
+def _key_codec(topic: Topic[T]) -> KeyCodec:
+    support = topic.type_support
+    return KeyCodec(
+        from_payload=support.key_from_payload,
+        from_key_payload=support.key_from_key_payload,
+        from_key_hash=support.key_from_key_hash,
+        to_key_hash=lambda key: support.key_hash(key, DataRepresentationId.XCDR1),
+    )

@@ -1,0 +1,232 @@
+"""DataWriter: writes samples of one topic.  DDS 1.4 §2.2.2.4.2 (DataWriter)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import datetime
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import trio
+
+from ddsi.engine import LocalWriter
+from ddsi.structure.cache_change import ChangeKind
+from ddsi.structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
+from ddsi.structure.guid import Guid
+from ddsi.structure.qos import EndpointQos, Qos, writer_qos
+from ddsi.structure.qos_policies import DataRepresentation, DataRepresentationId
+from ddsi.structure.status import PublicationMatched
+from ddsi.structure.time import Time
+
+from .entity import Entity
+from .groups import Publisher
+from .topic import Topic
+
+if TYPE_CHECKING:
+    from .participant import DomainParticipant
+
+__all__ = ["DataWriter"]
+
+T = TypeVar("T")
+Timestamp = float | datetime
+
+
+class DataWriter(Entity, Generic[T]):
+    """Writes samples of a topic; created without waiting, closed with its participant or by ``close()``."""
+
+    def __init__(self, parent: DomainParticipant | Publisher, topic: Topic[T], qos: Qos | None = None) -> None:
+        """``qos`` goes before the publisher's, and that before the topic's; the rest is the OMG's default (reliable).
+
+        Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
+        """
+        group_qos = parent.qos if isinstance(parent, Publisher) else Qos()
+        super().__init__(topic.qos | group_qos | (qos or Qos()))
+        participant = parent.participant if isinstance(parent, Publisher) else parent
+        parent._check_open()
+        topic._check_open()
+        if topic.participant is not participant:
+            raise PreconditionNotMet(f"topic {topic.name!r} belongs to another participant")
+        self._participant = participant
+        self._topic = topic
+        support = topic.type_support
+        self._support = support
+        resolved = _with_representation(writer_qos(self._qos), support.representations, topic)
+        self._endpoint_qos = resolved
+        self._representation = resolved.data_representation.ids[0]
+        self._serialize = support.serializer(self._representation)
+        self._serialize_key = support.key_serializer(self._representation)
+        self._is_keyed = support.is_keyed
+        self._room = trio.lowlevel.ParkingLot()
+        self._progress = trio.lowlevel.ParkingLot()
+        self._pump = participant._running_pump()
+        self._writer: LocalWriter = self._pump.engine.create_writer(
+            topic.name, support.type_name, resolved, self._pump.now(), is_keyed=support.is_keyed
+        )
+        parent._adopt(self)
+        participant._register(self._writer.guid, self)
+        self._pump.settle()
+
+    def __repr__(self) -> str:
+        return f"<DataWriter of {self._topic.name!r} {self.guid}>"
+
+    @property
+    def topic(self) -> Topic[T]:
+        return self._topic
+
+    @property
+    def guid(self) -> Guid:
+        return self._writer.guid
+
+    @property
+    def endpoint_qos(self) -> EndpointQos:
+        """Every policy as it holds for this writer, defaults filled in."""
+        return self._endpoint_qos
+
+    # --- writing -----------------------------------------------------------------------------------------
+
+    async def write(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
+        """Write one sample.  Returns as soon as it is in the history and on its way.
+
+        It waits only where a reliable writer may not take more (resource limits, octets not acknowledged), and
+        then at most ``max_blocking_time``: DdsTimeout.  ``timestamp``: seconds since 1970 or a datetime; now.
+        Raises BadParameter, naming the member, when the sample cannot be serialised; AlreadyDeleted.
+        """
+        if self._is_closed:
+            self._check_open()
+        pump = self._pump
+        now = trio.current_time()
+        await pump.checkpoint(now)
+        payload = self._serialize(sample)
+        key = self._support.key(sample) if self._is_keyed else b""
+        writer = self._writer
+        if writer.behavior.lacks_room(len(payload), key) is not None:
+            now = await self._wait_for_room(len(payload), key)
+        pump.engine.write(
+            writer, ChangeKind.ALIVE, payload, key, now,
+            source_timestamp=None if timestamp is None else _ticks(timestamp),
+        )  # fmt: skip
+        pump.written()
+
+    async def dispose(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
+        """The instance that ``sample`` belongs to (only its key fields matter) has come to its end."""
+        await self._write_end(ChangeKind.NOT_ALIVE_DISPOSED, sample, timestamp)
+
+    async def unregister(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
+        """This writer will not write the instance any more; by default that disposes it too (WriterDataLifecycle)."""
+        autodispose = self._endpoint_qos.writer_data_lifecycle.autodispose_unregistered_instances
+        kind = ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED if autodispose else ChangeKind.NOT_ALIVE_UNREGISTERED
+        await self._write_end(kind, sample, timestamp)
+
+    async def _write_end(self, kind: ChangeKind, sample: T, timestamp: Timestamp | None) -> None:
+        self._check_open()
+        if not self._is_keyed:
+            raise PreconditionNotMet(f"topic {self._topic.name!r} has no key, so it has no instances to end")
+        now = trio.current_time()
+        await self._pump.checkpoint(now)
+        payload = self._serialize_key(sample)
+        key = self._support.key(sample)
+        if self._writer.behavior.lacks_room(len(payload), key) is not None:
+            now = await self._wait_for_room(len(payload), key)
+        self._pump.engine.write(
+            self._writer, kind, payload, key, now,
+            source_timestamp=None if timestamp is None else _ticks(timestamp),
+            key_hash=self._support.key_hash(key, self._representation),
+        )  # fmt: skip
+        self._pump.written()
+
+    async def _wait_for_room(self, octets: int, key: bytes) -> float:
+        """Until one more change of so many octets may enter; returns the time.  Raises DdsTimeout."""
+        limit = self._endpoint_qos.reliability.max_blocking_time
+        behavior = self._writer.behavior
+        with trio.move_on_after(limit) if limit < math.inf else trio.CancelScope():
+            while (reason := behavior.lacks_room(octets, key)) is not None:
+                self._pump.engine.request_acknowledgment(self._writer, trio.current_time())
+                self._pump.settle()
+                await self._wait_for_progress()
+                self._check_open()
+            return trio.current_time()
+        raise DdsTimeout(
+            f"writer of {self._topic.name!r} found no room within max_blocking_time={limit} s: {reason}; "
+            "its readers are too slow, or one of them does not answer"
+        )
+
+    async def _wait_for_progress(self) -> None:
+        self._writer.wants_acknowledgment += 1
+        try:
+            await self._progress.park()
+        finally:
+            self._writer.wants_acknowledgment -= 1
+
+    # --- waiting -----------------------------------------------------------------------------------------
+
+    async def wait_for_acknowledgments(self, timeout: float | None = None) -> None:
+        """Until every matched reliable reader has all that was written so far.  Raises DdsTimeout.
+
+        DDS 1.4 §2.2.2.4.2.15.  A reader that is unmatched meanwhile counts as satisfied.
+        """
+        self._check_open()
+        await trio.lowlevel.checkpoint()
+        behavior = self._writer.behavior
+        last_sn = behavior.cache.last_sn
+        with trio.move_on_after(timeout) if timeout is not None else trio.CancelScope():
+            self._pump.settle()
+            while behavior.min_acked_sn() < last_sn:
+                self._pump.engine.request_acknowledgment(self._writer, trio.current_time())
+                self._pump.settle()
+                await self._wait_for_progress()
+                self._check_open()
+            return
+        raise DdsTimeout(
+            f"writer of {self._topic.name!r}: number {behavior.min_acked_sn()} of {last_sn} is acknowledged "
+            f"after {timeout} s"
+        )
+
+    async def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
+        """Until at least ``count`` readers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        await self._participant._wait_until(
+            self, lambda: self._writer.matched.current_count >= count, timeout,
+            f"writer of {self._topic.name!r} has not matched {count} reader(s)",
+        )  # fmt: skip
+
+    def matched_subscriptions(self) -> list[Guid]:
+        """The Guids of the readers that are matched now."""
+        return [*self._writer.behavior.readers, *self._writer.behavior.local_readers]
+
+    def assert_liveliness(self) -> None:
+        """Say that this writer is alive, where its liveliness is manual.  DDS 1.4 §2.2.2.4.2.22."""
+        self._check_open()
+        self._pump.engine.liveliness.assert_writer(self._writer, self._pump.now())
+        self._pump.settle()
+
+    # --- inside ------------------------------------------------------------------------------------------
+
+    def _made_progress(self) -> None:
+        self._progress.unpark_all()
+
+    def _on_close(self) -> None:
+        self._progress.unpark_all()
+        self._participant._deregister(self._writer.guid)
+        self._participant._when_running(lambda pump: pump.engine.delete_writer(self._writer, pump.now()))
+
+    def status_of_match(self) -> PublicationMatched:
+        """How many readers are matched, and were."""
+        return self._writer.matched
+
+
+def _with_representation(
+    qos: EndpointQos, possible: tuple[DataRepresentationId, ...], topic: Topic[T]
+) -> EndpointQos:
+    """A writer offers one representation: the first that was asked for, else the type's own choice."""
+    wanted = qos.data_representation.ids or possible[:1]
+    if wanted[0] not in (DataRepresentationId.XCDR1, DataRepresentationId.XCDR2):
+        raise BadParameter(f"topic {topic.name!r}: {wanted[0].name} cannot be written; use XCDR1 or XCDR2")
+    return replace(qos, data_representation=DataRepresentation(wanted[0]))
+
+
+def _ticks(timestamp: Timestamp) -> int:
+    """A source timestamp in ticks.  Raises BadParameter."""
+    seconds = timestamp.timestamp() if isinstance(timestamp, datetime) else timestamp
+    try:
+        return Time.from_seconds(seconds).ticks
+    except (ValueError, TypeError) as error:
+        raise BadParameter(f"timestamp: {error}") from error

@@ -1,0 +1,61 @@
+"""Topic: a name and a type.  DDS 1.4 §2.2.2.3 (Topic-Definition Module)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from ddsi.structure.errors import BadParameter
+from ddsi.structure.qos import Qos
+from ddsi.xtypes.type_support import TypeSupport, type_support
+
+from .entity import Entity
+
+if TYPE_CHECKING:
+    from .participant import DomainParticipant
+
+__all__ = ["Topic"]
+
+T = TypeVar("T")
+_MAX_NAME_OCTETS = 255
+
+
+class Topic(Entity, Generic[T]):
+    """What writers and readers agree on: the topic's name and the type of its samples.
+
+    ``qos`` serves the topic's writers and readers wherever they do not set a policy themselves.
+    """
+
+    def __init__(self, participant: DomainParticipant, name: str, type_: type[T], qos: Qos | None = None) -> None:
+        """``name``: 1 to 255 octets of UTF-8.  Raises BadParameter, also when ``type_`` cannot be a topic's type."""
+        super().__init__(qos)
+        if not isinstance(name, str) or not 1 <= len(name.encode()) <= _MAX_NAME_OCTETS or "\0" in name:
+            raise BadParameter(f"a topic's name is a str of 1 to 255 octets without NUL, not {name!r}")
+        participant._check_open()
+        self._participant = participant
+        self._name = name
+        self._type = type_
+        self._type_support: TypeSupport[T] = type_support(type_)
+        participant._adopt(self)
+
+    @property
+    def participant(self) -> DomainParticipant:
+        return self._participant
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def type(self) -> type[T]:
+        return self._type
+
+    @property
+    def type_name(self) -> str:
+        return self._type_support.type_name
+
+    @property
+    def type_support(self) -> TypeSupport[T]:
+        return self._type_support
+
+    def __repr__(self) -> str:
+        return f"<Topic {self._name!r} of {self.type_name}>"

@@ -1,0 +1,238 @@
+"""Pump: the trio shell around one engine.  The only place that reads the clock.
+
+It drains readable sockets in batches, runs the engine to completion, acts on its effects and re-arms one timer.
+Nothing is awaited between reading the engine's state and acting on it, so cancellation cannot tear it.
+
+Small samples that are written in one burst share a datagram: what the engine has queued leaves when its message is
+full, when the writing task yields (a flusher task runs then), or after a millisecond.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from random import SystemRandom
+
+import trio
+
+from ddsi.config import Config
+from ddsi.engine import Compute, Effect, Participant, ParticipantSetup, SendDatagram
+from ddsi.spi import PLAINTEXT, SecurityHooks
+from ddsi.structure.guid import GuidPrefix
+from ddsi.structure.locator import Locator
+from ddsi.structure.qos_policies import Properties
+from ddsi.trace.sink import TraceSink
+
+from .trace_files import open_trace
+from .udp import UdpTransport
+
+__all__ = ["Pump", "PumpOptions"]
+
+_BATCH = 64
+_MAX_BACKLOG = 1024
+_OPERATIONS_BEFORE_YIELD = 64
+_SECONDS_BEFORE_YIELD = 0.001
+_COMPUTE_THREADS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PumpOptions:
+    """What a participant is made of besides its configuration."""
+
+    domain_id: int
+    config: Config
+    hooks: SecurityHooks = PLAINTEXT
+    entity_name: str = ""
+    user_data: bytes = b""
+    properties: Properties = field(default_factory=dict)
+
+
+class Pump:
+    """Opened by the constructor (sockets and engine), driven by :meth:`run`.
+
+    ``on_effect`` takes every effect that is not about the network: data, statuses, progress.
+    """
+
+    def __init__(self, options: PumpOptions, on_effect: Callable[[Effect], None], trace: TraceSink | None = None) -> None:
+        self._on_effect = on_effect
+        self._files = ExitStack()
+        self.transport = UdpTransport(options.domain_id, options.config)
+        self._files.callback(self.transport.close)
+        try:
+            now = trio.current_time()
+            tracing = open_trace(options.config, self._files, epoch_offset=time.time() - now)
+            self.engine = Participant(
+                self._setup(options), random=SystemRandom(), wall_clock=time.time_ns, hooks=options.hooks,
+                trace=trace or tracing,
+            )  # fmt: skip
+        except BaseException:
+            self._files.close()
+            raise
+        self._timer_scope: trio.CancelScope | None = None
+        self._flusher = trio.lowlevel.ParkingLot()
+        self._flush_wanted = False
+        self._backlog: deque[tuple[SendDatagram, Locator]] = deque()
+        self._backlog_waiting = trio.lowlevel.ParkingLot()
+        self.dropped_at_send = 0
+        self._nursery: trio.Nursery | None = None
+        self._limiter = trio.CapacityLimiter(_COMPUTE_THREADS)
+        self._operations = 0
+        self._last_yield = -math.inf
+
+    def _setup(self, options: PumpOptions) -> ParticipantSetup:
+        locators = self.transport.unicast_locators()
+        return ParticipantSetup(
+            domain_id=options.domain_id,
+            guid_prefix=GuidPrefix(options.config.vendor_id + os.urandom(10)),
+            config=options.config,
+            metatraffic_unicast=locators,
+            metatraffic_multicast=self.transport.multicast_locators(),
+            default_unicast=locators,
+            announce_to=self.transport.announce_to(),
+            max_message_octets=self.transport.max_message_octets,
+            entity_name=options.entity_name,
+            user_data=options.user_data,
+            properties=options.properties,
+        )
+
+    @staticmethod
+    def now() -> float:
+        """The engine's clock."""
+        return trio.current_time()
+
+    # --- running -----------------------------------------------------------------------------------------
+
+    async def run(self, nursery: trio.Nursery) -> None:
+        """Start all tasks in ``nursery`` and begin to announce."""
+        self._nursery = nursery
+        for sock in self.transport.sockets():
+            nursery.start_soon(self._receive, sock, name="ddsi receive")
+        nursery.start_soon(self._keep_time, name="ddsi timer")
+        nursery.start_soon(self._flush_when_idle, name="ddsi flush")
+        nursery.start_soon(self._send_backlog, name="ddsi send")
+        self.engine.start(self.now())
+        self.settle()
+
+    def close(self) -> None:
+        """Say goodbye and close everything.  Safe twice."""
+        self.engine.close(self.now())
+        self.settle()
+        self._files.close()
+
+    async def _receive(self, sock: socket.socket) -> None:
+        buffer = bytearray(65536)
+        view = memoryview(buffer)
+        engine, locator_of = self.engine, self.transport.locator_of
+        while True:
+            await trio.lowlevel.wait_readable(sock)
+            now = trio.current_time()
+            for _ in range(_BATCH):
+                try:
+                    octets, address = sock.recvfrom_into(buffer)
+                except BlockingIOError:
+                    break
+                except OSError:  # an ICMP error for something sent before; it is not about this socket
+                    continue
+                engine.receive_datagram(view[:octets], locator_of(address), now)
+            self.settle()
+
+    async def _keep_time(self) -> None:
+        """Call the engine when its earliest timer is due; others move that deadline by :meth:`_rearm`."""
+        while True:
+            with trio.CancelScope(deadline=self.engine.next_deadline()) as self._timer_scope:
+                await trio.sleep_forever()
+            now = trio.current_time()
+            if self.engine.next_deadline() <= now:
+                self.engine.handle_timeout(now)
+                self.settle()
+
+    async def _flush_when_idle(self) -> None:
+        """Woken by the first write of a burst; runs when the writing task yields."""
+        while True:
+            await self._flusher.park()
+            self.settle()
+
+    async def _send_backlog(self) -> None:
+        """What the system's buffer did not take at once, in order, when it does."""
+        while True:
+            await self._backlog_waiting.park()
+            while self._backlog:
+                await trio.lowlevel.wait_writable(self.transport.unicast[0])
+                while self._backlog and self.transport.send(self._backlog[0][0].parts, self._backlog[0][1]):
+                    self._backlog.popleft()
+
+    # --- effects -----------------------------------------------------------------------------------------
+
+    def settle(self) -> None:
+        """Act on everything the engine has asked for, flush what it has queued, and re-arm the timer."""
+        self._flush_wanted = False
+        for effect in self.engine.drain_effects():
+            if isinstance(effect, SendDatagram):
+                self._send(effect)
+            elif isinstance(effect, Compute):
+                assert self._nursery is not None
+                self._nursery.start_soon(self._compute, effect)
+            else:
+                self._on_effect(effect)
+        self._rearm()
+
+    def written(self) -> None:
+        """After a write: act at once on what is finished, and leave the rest for when the task yields."""
+        if self.engine.has_effects:
+            self.settle_finished()
+        if not self._flush_wanted:
+            self._flush_wanted = True
+            self._flusher.unpark_all()
+            self._rearm()
+
+    def settle_finished(self) -> None:
+        """As :meth:`settle`, but messages that are not full stay open."""
+        for effect in self.engine.take_finished():
+            if isinstance(effect, SendDatagram):
+                self._send(effect)
+            else:
+                self._on_effect(effect)
+
+    def before_waiting(self) -> None:
+        """The calling task is about to wait: nothing of its own may lie in a queue meanwhile."""
+        if self._flush_wanted or self.engine.has_effects:
+            self.settle()
+
+    def _rearm(self) -> None:
+        scope = self._timer_scope
+        if scope is not None:
+            deadline = self.engine.next_deadline()
+            if deadline < scope.deadline:
+                scope.deadline = deadline
+
+    def _send(self, effect: SendDatagram) -> None:
+        for locator in effect.destinations:
+            if self._backlog or not self.transport.send(effect.parts, locator):
+                if len(self._backlog) >= _MAX_BACKLOG:
+                    self.dropped_at_send += 1
+                    continue
+                self._backlog.append((replace(effect, parts=[b"".join(effect.parts)]), locator))
+                self._backlog_waiting.unpark_all()
+
+    async def _compute(self, effect: Compute) -> None:
+        result = await trio.to_thread.run_sync(effect.job, limiter=self._limiter, abandon_on_cancel=True)
+        effect.computed(result, self.now())
+        self.settle()
+
+    # --- fairness ----------------------------------------------------------------------------------------
+
+    async def checkpoint(self, now: float) -> None:
+        """A cancellation point for operations that need not wait; yields after 64 of them, or a millisecond."""
+        self._operations += 1
+        if self._operations >= _OPERATIONS_BEFORE_YIELD or now - self._last_yield > _SECONDS_BEFORE_YIELD:
+            self._operations = 0
+            await trio.lowlevel.checkpoint()
+            self._last_yield = trio.current_time()
+        else:
+            await trio.lowlevel.checkpoint_if_cancelled()

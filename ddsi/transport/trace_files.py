@@ -1,0 +1,41 @@
+"""Opens the files that a configuration wants traces in.  ``ddsi.trace`` makes their content."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from typing import TextIO
+
+from ddsi.config import Config
+from ddsi.structure.errors import ConfigurationError
+from ddsi.trace.pcapng import PcapngSink
+from ddsi.trace.sink import JsonLinesSink, TraceSink, tee
+
+__all__ = ["open_trace"]
+
+
+def open_trace(config: Config, files: ExitStack, *, epoch_offset: float) -> TraceSink | None:
+    """A sink for what ``config`` asks for, None when tracing is off.  ``files`` closes what is opened here.
+
+    ``epoch_offset``: seconds to add to the engine's clock to have seconds since 1970.
+    """
+    sinks: list[TraceSink] = []
+    try:
+        if config.trace_file:
+            sinks.append(JsonLinesSink(_text_stream(config, files), epoch_offset=epoch_offset))
+        if config.pcap_file:
+            stream = files.enter_context(open(config.pcap_file, "wb"))  # noqa: SIM115 - closed by the stack
+            sinks.append(PcapngSink(stream, epoch_offset=epoch_offset))
+    except OSError as error:
+        raise ConfigurationError(f"a trace file cannot be opened: {error}") from error
+    if not sinks:
+        return None
+    return sinks[0] if len(sinks) == 1 else tee(*sinks)
+
+
+def _text_stream(config: Config, files: ExitStack) -> TextIO:
+    if config.trace_file in ("stdout", "stderr"):
+        return sys.stdout if config.trace_file == "stdout" else sys.stderr
+    mode = "a" if config.trace_append else "w"
+    stream: TextIO = open(config.trace_file, mode, buffering=1, encoding="utf-8")  # type: ignore[assignment]  # noqa: SIM115
+    return files.enter_context(stream)

@@ -1,0 +1,260 @@
+"""UdpTransport: the sockets of one participant.  RTPS 2.5 §9.6 (mapping to UDP/IP).
+
+One unicast socket per chosen interface, all on the same port, for builtin and user traffic alike; one socket for the
+multicast group of the domain.  Unicast ports are never shared: two sockets on one port would split the traffic.
+"""
+
+from __future__ import annotations
+
+import errno
+import ipaddress
+import socket
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from ddsi.config import Config
+from ddsi.structure.errors import ConfigurationError, OutOfResources
+from ddsi.structure.locator import Locator, LocatorKind
+
+from .platform import (
+    Interface,
+    allow_shared_port,
+    bind_address_for_group,
+    enlarge_buffer,
+    list_interfaces,
+    receive_only_joined_groups,
+)
+
+__all__ = ["UdpTransport"]
+
+_LOOPBACK_MESSAGE = 65000
+_OTHER_MESSAGE = 14720  # about ten Ethernet frames
+_IP_UDP_HEADERS = 28
+_JOIN_BELOW = 2048
+_MAX_IOV = 512
+_EPHEMERAL = 0
+
+Octets = bytes | bytearray | memoryview
+
+
+class UdpTransport:
+    """Opened at once by the constructor; :meth:`close` closes all.  Raises ConfigurationError, OutOfResources."""
+
+    def __init__(self, domain_id: int, config: Config, interfaces: Callable[[], list[Interface]] = list_interfaces) -> None:
+        self.interfaces = _choose(interfaces(), config.interfaces)
+        self.uses_multicast = config.multicast is not False
+        self._config = config
+        self._domain_id = domain_id
+        self.unicast: list[socket.socket] = []
+        self.multicast: socket.socket | None = None
+        self.participant_index: int | None = None
+        self._by_locator: dict[Locator, tuple[tuple[str, int], Sequence[socket.socket]]] = {}
+        self._locators: dict[tuple[str, int], Locator] = {}
+        try:
+            self._open_unicast()
+            if self.uses_multicast:
+                self._open_multicast()
+        except BaseException:
+            self.close()
+            raise
+
+    # --- what the participant announces ------------------------------------------------------------------
+
+    @property
+    def port(self) -> int:
+        return int(self.unicast[0].getsockname()[1])
+
+    @property
+    def is_loopback_only(self) -> bool:
+        return all(interface.is_loopback for interface in self.interfaces)
+
+    @property
+    def max_message_octets(self) -> int:
+        """The largest UDP payload to send: whole datagrams on loopback, elsewhere some frames' worth."""
+        if self._config.max_message_size is not None:
+            return self._config.max_message_size
+        mtu = min(interface.mtu for interface in self.interfaces)
+        return min(_LOOPBACK_MESSAGE if self.is_loopback_only else _OTHER_MESSAGE, max(mtu - _IP_UDP_HEADERS, _OTHER_MESSAGE))
+
+    def unicast_locators(self) -> tuple[Locator, ...]:
+        """Where this participant can be reached; loopback only when there is nothing else."""
+        return tuple(Locator.udp_v4(interface.address, self.port) for interface in self.interfaces)
+
+    def multicast_locators(self) -> tuple[Locator, ...]:
+        if self.multicast is None:
+            return ()
+        port = self._config.ports.metatraffic_multicast(self._domain_id)
+        return (Locator.udp_v4(self._config.multicast_address, port),)
+
+    def announce_to(self) -> tuple[Locator, ...]:
+        """Where SPDP goes: the group, configured peers, and on loopback everybody's well-known ports."""
+        destinations = list(self.multicast_locators())
+        peers = self._config.peers
+        if not peers and any(interface.is_loopback for interface in self.interfaces):
+            peers = ("127.0.0.1",)
+        for peer in peers:
+            destinations.extend(self._peer_locators(peer))
+        own = set(self.unicast_locators())
+        return tuple(locator for locator in dict.fromkeys(destinations) if locator not in own)
+
+    def _peer_locators(self, peer: str) -> list[Locator]:
+        host, colon, port = peer.rpartition(":")
+        try:
+            if colon:
+                return [Locator.udp_v4(socket.gethostbyname(host), int(port))]
+            address = socket.gethostbyname(peer)
+        except OSError as error:
+            raise ConfigurationError(f"peer {peer!r} cannot be resolved to an IPv4 address: {error}") from error
+        if ipaddress.IPv4Address(address).is_multicast:
+            return [Locator.udp_v4(address, self._config.ports.metatraffic_multicast(self._domain_id))]
+        indices = range(self._config.max_auto_participant_index + 1)
+        return [Locator.udp_v4(address, self._config.ports.metatraffic_unicast(self._domain_id, i)) for i in indices]
+
+    # --- opening -----------------------------------------------------------------------------------------
+
+    def _open_unicast(self) -> None:
+        """Probe the well-known ports in order (RTPS 2.5 §9.6.2.3); when all are taken, any port will do.
+
+        Peers learn the true port by SPDP; only those that know us by unicast alone need the well-known one.
+        """
+        index = self._config.participant_index
+        if isinstance(index, int):
+            if not self._bind_all(self._config.ports.metatraffic_unicast(self._domain_id, index)):
+                raise ConfigurationError(
+                    f"participant index {index} of domain {self._domain_id} is taken; choose another or 'auto'"
+                )
+            self.participant_index = index
+            return
+        if index == "auto":
+            for candidate in range(self._config.max_auto_participant_index + 1):
+                if self._bind_all(self._config.ports.metatraffic_unicast(self._domain_id, candidate)):
+                    self.participant_index = candidate
+                    return
+        if not self._bind_all(_EPHEMERAL):
+            raise OutOfResources("no UDP port is free")
+
+    def _bind_all(self, port: int) -> bool:
+        """One socket per interface on this port, or none at all."""
+        opened: list[socket.socket] = []
+        for interface in self.interfaces:
+            sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            opened.append(sock)
+            sock.setblocking(False)
+            try:
+                sock.bind((interface.address, port))
+            except OSError as error:
+                for other in opened:
+                    other.close()
+                if error.errno in (errno.EADDRINUSE, errno.EACCES):
+                    return False
+                raise ConfigurationError(f"cannot listen on {interface.address}:{port}: {error}") from error
+            port = sock.getsockname()[1]
+            self._set_options(sock, interface)
+        self.unicast = opened
+        return True
+
+    def _set_options(self, sock: socket.socket, interface: Interface) -> None:
+        enlarge_buffer(sock, socket.SO_RCVBUF, self._config.receive_buffer_size)
+        enlarge_buffer(sock, socket.SO_SNDBUF, self._config.send_buffer_size)
+        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(interface.address))
+        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self._config.multicast_ttl)
+        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+
+    def _open_multicast(self) -> None:
+        """Join the group on every chosen interface.  One that cannot is left out, as loopback often cannot."""
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.multicast = sock
+        sock.setblocking(False)
+        allow_shared_port(sock)
+        receive_only_joined_groups(sock)
+        group = self._config.multicast_address
+        sock.bind((bind_address_for_group(group), self._config.ports.metatraffic_multicast(self._domain_id)))
+        enlarge_buffer(sock, socket.SO_RCVBUF, self._config.receive_buffer_size)
+        joined = 0
+        for interface in self.interfaces:
+            membership = socket.inet_aton(group) + socket.inet_aton(interface.address)
+            with suppress(OSError):
+                sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+                joined += 1
+        if not joined:
+            sock.close()
+            self.multicast = None
+
+    # --- in and out --------------------------------------------------------------------------------------
+
+    def locator_of(self, address: tuple[str, int]) -> Locator:
+        """The source of a datagram as a Locator; the latest few are remembered."""
+        locator = self._locators.get(address)
+        if locator is None:
+            if len(self._locators) >= 1024:
+                self._locators.clear()
+            locator = self._locators[address] = Locator.udp_v4(*address)
+        return locator
+
+    def send(self, parts: Sequence[Octets], locator: Locator) -> bool:
+        """Send one datagram; False when the system's buffer is full and it must be tried again.
+
+        What the network refuses (nobody there, no route) is gone: reliable writers repair, announcements repeat.
+        """
+        route = self._by_locator.get(locator)
+        if route is None:
+            route = self._route(locator)
+        address, sockets = route
+        for sock in sockets:
+            try:
+                if len(parts) == 1:
+                    sock.sendto(parts[0], address)
+                elif len(parts) > _MAX_IOV or sum(map(len, parts)) < _JOIN_BELOW:
+                    sock.sendto(b"".join(parts), address)
+                else:
+                    sock.sendmsg(parts, (), 0, address)
+            except BlockingIOError:
+                return False
+            except OSError:
+                continue
+        return True
+
+    def _route(self, locator: Locator) -> tuple[tuple[str, int], Sequence[socket.socket]]:
+        """Which sockets a locator is sent through: multicast on every interface, unicast on the one that reaches it."""
+        if len(self._by_locator) >= 4096:
+            self._by_locator.clear()
+        sockets: Sequence[socket.socket] = ()
+        if locator.kind == LocatorKind.UDPV4 and 0 < locator.port <= 65535 and not locator.is_unspecified:
+            sockets = self.unicast if locator.is_multicast else self._socket_towards(locator)
+        route = self._by_locator[locator] = ((locator.host, locator.port), sockets)
+        return route
+
+    def _socket_towards(self, locator: Locator) -> Sequence[socket.socket]:
+        for interface, sock in zip(self.interfaces, self.unicast, strict=True):
+            if interface.reaches(locator.host):
+                return (sock,)
+        outward = [sock for interface, sock in zip(self.interfaces, self.unicast, strict=True) if not interface.is_loopback]
+        if locator.is_loopback:
+            return ()  # another host's loopback, or ours without an interface there: it cannot be reached
+        return tuple(outward[:1])
+
+    def sockets(self) -> list[socket.socket]:
+        """All that are read from."""
+        return self.unicast if self.multicast is None else [*self.unicast, self.multicast]
+
+    def close(self) -> None:
+        for sock in self.sockets():
+            sock.close()
+
+
+def _choose(available: list[Interface], wanted: tuple[str, ...]) -> list[Interface]:
+    """The interfaces named, by name or address; none named: all but loopback, or loopback when it is alone."""
+    if not wanted:
+        outward = [interface for interface in available if not interface.is_loopback]
+        chosen = outward or available
+    else:
+        chosen = []
+        for name in wanted:
+            found = [interface for interface in available if name in (interface.name, interface.address)]
+            if not found:
+                names = ", ".join(f"{interface.name} ({interface.address})" for interface in available) or "none"
+                raise ConfigurationError(f"there is no interface {name!r} that is up and has an IPv4 address; there are: {names}")
+            chosen.extend(interface for interface in found if interface not in chosen)
+    if not chosen:
+        raise ConfigurationError("no network interface is up, not even loopback")
+    return chosen
