@@ -1,7 +1,8 @@
 """Types and their octets (DDS-XTypes 1.3): the ``idl`` annotations, codecs generated per type, keys and key hashes."""
 
+from . import idl
 from .model import Extensibility
 from .octets import deserialize, key_hash, serialize
 from .type_support import Octets, TypeSupport, type_support
 
-__all__ = ["Extensibility", "Octets", "TypeSupport", "deserialize", "key_hash", "serialize", "type_support"]
+__all__ = ["Extensibility", "Octets", "TypeSupport", "deserialize", "idl", "key_hash", "serialize", "type_support"]

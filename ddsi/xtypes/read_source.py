@@ -108,7 +108,7 @@ class _TypeReader:
         emitter = self._emitter
         delimited = has_dheader(type_, self._encoding)
         length = emitter.item("I", 4, "h") if delimited else ""
-        end = "h_end"
+        end = "h_end" if delimited else ""
         if delimited:
             emitter.then(f"{end} = 8 + {length}")
         value = self._struct_members(type_, end)

@@ -78,8 +78,8 @@ class TypeSupport(Generic[T]):
         self.type_name: str = struct.type_name
         self.extensibility: Extensibility = struct.extensibility
         self.representations: tuple[DataRepresentationId, ...] = _representations(_resolved(struct))
-        self._sources: dict[str, str] = {}
-        self._writers: dict[tuple[StructType, Encoding, bool], Callable[[Any], bytes]] = {}
+        self._sources: dict[tuple[Any, ...], str] = {}
+        self._writers: dict[tuple[Any, ...], Callable[[Any], bytes]] = {}
         key, canonical = key_type(struct), canonical_key_type(struct)
         self.is_keyed: bool = canonical is not None
         self.deserialize = self._reader(struct)
@@ -90,7 +90,7 @@ class TypeSupport(Generic[T]):
         self._key_struct, self._canonical = key, canonical
         self._read_key_payload = self._reader(key)
         self._read_canonical = self._reader(canonical)
-        self.key = self._checked(self._generate_writer(canonical, _CANONICAL, header=False, padded=False))
+        self.key = self._writer(canonical, _CANONICAL, header=False)
         self.key_from_payload = self._key_extractor(struct, canonical)
 
     def __repr__(self) -> str:
@@ -113,7 +113,7 @@ class TypeSupport(Generic[T]):
         (unless not ``padded``).  The function raises BadParameter, naming the member, for an unfit value.
         """
         encoding = Encoding(_checked_representation(representation), little_endian)
-        return self._serializer(self.struct, encoding, padded=padded and encoding.is_xcdr2)
+        return self._writer(self.struct, encoding, padded=padded and encoding.is_xcdr2)
 
     # --- keys --------------------------------------------------------------------------------------------
 
@@ -128,7 +128,7 @@ class TypeSupport(Generic[T]):
         if self._key_struct is None:
             header = encoding.encapsulation_id(self.extensibility) + bytes(2)
             return lambda sample: header
-        return self._serializer(self._key_struct, encoding, padded=padded and encoding.is_xcdr2)
+        return self._writer(self._key_struct, encoding, padded=padded and encoding.is_xcdr2)
 
     def deserialize_key(self, octets: Octets) -> T:
         """A sample with the key of a key-only payload, and the type's defaults elsewhere.  MalformedSample."""
@@ -160,8 +160,9 @@ class TypeSupport(Generic[T]):
         encoding = Encoding(_checked_representation(representation), little_endian=False)
         octets = key
         if not encoding.is_xcdr2 and alignments_differ(self._canonical):
-            sample = self._read_canonical(_CANONICAL_HEADER + key)
-            octets = self._generate_writer(self._canonical, encoding, header=False, padded=False)(sample)
+            octets = self._writer(self._canonical, encoding, header=False)(
+                self._read_canonical(_CANONICAL_HEADER + key)
+            )
         if hash_is_digest(self.struct, self._canonical, encoding):
             return hashlib.md5(octets, usedforsecurity=False).digest()
         return octets.ljust(KEY_HASH_OCTETS, b"\0")
@@ -192,19 +193,17 @@ class TypeSupport(Generic[T]):
 
     # --- making codecs -----------------------------------------------------------------------------------
 
-    def _serializer(self, struct: StructType, encoding: Encoding, *, padded: bool) -> Callable[[Any], bytes]:
-        cached = self._writers.get((struct, encoding, padded))
-        if cached is None:
-            cached = self._checked(self._generate_writer(struct, encoding, header=True, padded=padded))
-            self._writers[struct, encoding, padded] = cached
-        return cached
-
-    def _generate_writer(
-        self, struct: StructType, encoding: Encoding, *, header: bool, padded: bool
+    def _writer(
+        self, struct: StructType, encoding: Encoding, *, header: bool = True, padded: bool = False
     ) -> Callable[[Any], bytes]:
-        write, text = generate_writer(struct, encoding, header=header, padded=padded)
-        self._sources[text.split("\n", 1)[0] + f"{header}{padded}{id(struct)}"] = text
-        return write
+        """The checked writer of the type or of a projection of it; generated once."""
+        choice = (struct, encoding, header, padded)
+        cached = self._writers.get(choice)
+        if cached is None:
+            write, text = generate_writer(struct, encoding, header=header, padded=padded)
+            self._sources[choice] = text
+            cached = self._writers[choice] = self._checked(write)
+        return cached
 
     def _checked(self, write: Callable[[Any], bytes]) -> Callable[[T], bytes]:
         """Let ``write`` fail, and then find out why."""
@@ -216,8 +215,9 @@ class TypeSupport(Generic[T]):
                     raise TypeError
                 return write(sample)
             except Exception as error:
-                check_sample(struct, sample)
-                raise BadParameter(f"{name}: the sample cannot be written: {error}") from error
+                failure = error
+            check_sample(struct, sample)
+            raise BadParameter(f"{name}: the sample cannot be written: {failure}") from failure
 
         return serialize
 
@@ -231,7 +231,7 @@ class TypeSupport(Generic[T]):
 
         def deserialize(octets: Octets) -> Any:
             try:
-                if octets.__class__ is bytes:
+                if isinstance(octets, bytes):
                     return readers[octets[:2]](octets)
                 if len(octets) < _VIEW_FROM:
                     octets = bytes(octets)
@@ -255,7 +255,7 @@ class TypeSupport(Generic[T]):
     ) -> None:
         def generate_first(octets: Any) -> Any:
             read, text = generate_reader(struct, encoding, view=view)
-            self._sources[text.split("\n", 1)[0] + str(id(struct))] = text
+            self._sources[struct, encoding, "read", view] = text
             readers[identifier] = read
             return read(octets)
 
@@ -273,7 +273,7 @@ class TypeSupport(Generic[T]):
             generated = generate_key_extractor(struct, canonical, encoding)
             if generated is not None:
                 extractors[identifier], text = generated
-                self._sources[text.split("\n", 1)[0]] = text
+                self._sources[struct, encoding, "key"] = text
         deserialize, key_of = self.deserialize, self._key_of
 
         def key_from_payload(octets: Octets) -> bytes:

@@ -7,6 +7,7 @@ leisure.  It reports the first in declaration order as ``BadParameter("pose.posi
 
 from __future__ import annotations
 
+import contextlib
 import math
 import operator
 import struct
@@ -123,12 +124,10 @@ def _check_sequence(type_: SequenceType, value: Any, path: str, depth: int) -> N
 
 def _check_array(type_: ArrayType, value: Any, path: str, depth: int) -> None:
     _count(type_, value, path)
-    try:
+    flat: Any = None
+    with contextlib.suppress(TypeError, ValueError):
         flat = flatten(value, type_.dimensions)
-        fits = type_.count == (memoryview(flat).nbytes // _itemsize(flat) if _is_buffer(flat) else len(flat))
-    except (TypeError, ValueError):
-        fits = False
-    if not fits:
+    if flat is None or type_.count != (memoryview(flat).nbytes // _itemsize(flat) if _is_buffer(flat) else len(flat)):
         raise BadParameter(f"{path}: {_shape(value)} elements where the array has {_times(type_.dimensions)}")
     _check_elements(type_.element, flat, path, depth)
 
