@@ -37,13 +37,14 @@ class ChangeSink(Protocol):
 class RemoteWriter:
     """A remote writer as the participant sees it: who reads it here, and its fragments.  Other name: proxy_writer."""
 
-    __slots__ = ("asserts_by_data", "data", "defragmenter", "guid", "participant", "readers")
+    __slots__ = ("asserts_by_data", "data", "defragmenter", "guid", "is_reliable", "participant", "readers")
 
     def __init__(self, data: DiscoveredWriterData, defragmenter: Defragmenter, participant: object = None) -> None:
         self.data = data
         self.guid = data.guid
         self.defragmenter = defragmenter
         self.participant = participant
+        self.is_reliable = data.qos.is_reliable
         liveliness = data.qos.liveliness
         self.asserts_by_data = liveliness.KIND > 0 and liveliness.lease_duration < math.inf
         self.readers: list[tuple[StatefulReader, WriterProxy]] = []

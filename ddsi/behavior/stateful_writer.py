@@ -75,6 +75,11 @@ class StatefulWriter:
 
     # --- the application's side --------------------------------------------------------------------------
 
+    @property
+    def needs_key(self) -> bool:
+        """Must changes come with their key: for the history's sake, or for readers of this participant?"""
+        return self.cache.keeps_instances or bool(self.local_readers)
+
     def lacks_room(self, octets: int, key: bytes) -> str | None:
         """Why one more change of so many octets has to wait, in words; None when it has not to."""
         reason = self.cache.lacks_room(key)

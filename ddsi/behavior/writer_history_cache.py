@@ -29,6 +29,7 @@ class WriterHistoryCache:
         "_max_instances",
         "_max_per_instance",
         "_max_samples",
+        "keeps_instances",
         "last_sn",
         "octets",
         "unacknowledged_octets",
@@ -44,6 +45,7 @@ class WriterHistoryCache:
         per_instance = limits.max_samples_per_instance
         self._max_per_instance = per_instance if per_instance != LENGTH_UNLIMITED else 0
         self._keeps_acknowledged = qos.is_transient_local
+        self.keeps_instances = bool(self._depth or self._max_instances or self._max_per_instance)
         self._first_sn = 1
         self._acked_sn = 0
         self.last_sn = 0
@@ -84,6 +86,8 @@ class WriterHistoryCache:
         With KEEP_LAST an old change of the instance makes room for the new one, so only the limits on
         instances, and on samples of all of them, can be met.
         """
+        if not self.keeps_instances:
+            return "max_samples" if self._max_samples and len(self._changes) >= self._max_samples else None
         instance = self._by_instance.get(key)
         if self._max_instances and instance is None and len(self._by_instance) >= self._max_instances:
             return "max_instances"
@@ -104,7 +108,7 @@ class WriterHistoryCache:
         size = len(change.payload)
         self.octets += size
         self.unacknowledged_octets += size
-        if not (self._depth or self._max_per_instance or self._max_instances):
+        if not self.keeps_instances:
             return None
         instance = self._by_instance.get(change.key)
         if instance is None:

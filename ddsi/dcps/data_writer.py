@@ -54,6 +54,7 @@ class DataWriter(Entity, Generic[T]):
         self._endpoint_qos = resolved
         self._representation = resolved.data_representation.ids[0]
         self._serialize = support.serializer(self._representation)
+        self._key = support.key
         self._serialize_key = support.key_serializer(self._representation)
         self._is_keyed = support.is_keyed
         self._room = trio.lowlevel.ParkingLot()
@@ -96,9 +97,9 @@ class DataWriter(Entity, Generic[T]):
         pump = self._pump
         now = trio.current_time()
         await pump.checkpoint(now)
-        payload = self._serialize(sample)
-        key = self._support.key(sample) if self._is_keyed else b""
         writer = self._writer
+        payload = self._serialize(sample)
+        key = self._key(sample) if self._is_keyed and writer.behavior.needs_key else b""
         if writer.behavior.lacks_room(len(payload), key) is not None:
             now = await self._wait_for_room(len(payload), key)
         pump.engine.write(

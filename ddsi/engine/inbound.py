@@ -7,6 +7,7 @@ else is decoded into the classes of ``messages``.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from ddsi.discovery.participant_proxy import ParticipantProxy
 from ddsi.messages.acknack import AckNack, NackFrag
 from ddsi.messages.data import Data
 from ddsi.messages.data_frag import DataFrag
-from ddsi.messages.fast import DATA_BODY
+from ddsi.messages.fast import DATA_BODY, SUBMESSAGE_HEAD
 from ddsi.messages.gap import Gap
 from ddsi.messages.heartbeat import Heartbeat, HeartbeatFrag
 from ddsi.messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 __all__ = ["Inbound", "Incoming"]
 
 _DATA = int(SubmessageKind.DATA)
+_INFO_TS = int(SubmessageKind.INFO_TS)
+_TIMESTAMP = struct.Struct("<II")
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
 _UNKNOWN_ID = bytes(4)
 _UNKNOWN_PREFIX = bytes(12)
@@ -129,23 +132,44 @@ class Inbound:
         self._submessages(incoming, view, 20)
 
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
-        handlers = self._handlers
+        """Dispatch what lies in ``view[start:]``.
+
+        DATA and INFO_TS in their usual form are recognised here and take their short way; everything from the first other
+        submessage on is walked by ``iterate_submessages``, which knows all the rules.  Samples come in long runs, so
+        the walk returns to the short loop behind each HEARTBEAT or the like.
+        """
+        position, end = start, len(view)
+        unpack_head = SUBMESSAGE_HEAD.unpack_from
+        while end - position >= 4:
+            kind, flags, length = unpack_head(view, position)
+            body = position + 4
+            position = body + length
+            if kind == _DATA and flags == _LE_DATA_ONLY and length and position <= end and not length & 3:
+                if incoming.is_for_us:
+                    self._data(incoming, view, body, position)
+            elif kind == _INFO_TS and flags == 1 and length == 8 and position <= end:
+                seconds, fraction = _TIMESTAMP.unpack_from(view, body)
+                incoming.timestamp = seconds << 32 | fraction
+            else:
+                position = self._general_submessages(incoming, view, body - 4)
+
+    def _general_submessages(self, incoming: Incoming, view: memoryview, start: int) -> int:
+        """One submessage, or one SEC_ envelope of several: returns where the next begins."""
         envelope_start = -1
         for raw in iterate_submessages(view, start=start):
             kind = raw.kind
             if envelope_start >= 0:
                 if kind == SubmessageKind.SEC_POSTFIX:
                     self._envelope(incoming, view[envelope_start : raw.end])
-                    envelope_start = -1
-            elif kind == _DATA and raw.flags == _LE_DATA_ONLY:
-                if incoming.is_for_us:
-                    self._data(incoming, raw.body)
+                    return raw.end
             elif kind == SubmessageKind.SEC_PREFIX:
                 envelope_start = raw.offset
             else:
-                handler = handlers.get(kind)
+                handler = self._handlers.get(kind)
                 if handler is not None:  # unknown and vendors' own kinds are skipped (RTPS 2.5 §8.3.4.1)
                     handler(incoming, raw)
+                return raw.end
+        return len(view)
 
     def _envelope(self, incoming: Incoming, octets: memoryview) -> None:
         """SEC_PREFIX to SEC_POSTFIX: whose it is, is told by INFO_DST before anything is decrypted."""
@@ -190,22 +214,26 @@ class Inbound:
 
     # --- DATA --------------------------------------------------------------------------------------------
 
-    def _data(self, incoming: Incoming, body: memoryview) -> None:
-        """A sample in its usual form.  The general form is :meth:`_general_data`; both end in :meth:`_change`."""
-        if len(body) < 24:
-            raise MalformedMessage("a DATA without room for its payload", element="DATA")
-        _, to_inline_qos, reader_id, writer_id, high, low = DATA_BODY.unpack_from(body)
+    def _data(self, incoming: Incoming, view: memoryview, start: int, end: int) -> None:
+        """A sample in its usual form, its body at ``view[start:end]``.
+
+        The general form is :meth:`_general_data`; both end in :meth:`_change`.
+        """
+        if end - start < 24:
+            raise MalformedMessage("a DATA without room for its payload", element="DATA", offset=start)
+        _, to_inline_qos, reader_id, writer_id, high, low = DATA_BODY.unpack_from(view, start)
         number = high << 32 | low
-        if number < 1 or to_inline_qos < 16 or to_inline_qos & 3 or len(body) < 8 + to_inline_qos:
-            raise MalformedMessage(f"number {number}, octetsToInlineQos {to_inline_qos}", element="DATA")
+        payload_start = start + 4 + to_inline_qos
+        if number < 1 or to_inline_qos < 16 or to_inline_qos & 3 or end - payload_start < 4:
+            raise MalformedMessage(f"number {number}, octetsToInlineQos {to_inline_qos}", element="DATA", offset=start)
         remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
         if remote is None:
-            self._from_unmatched(incoming, writer_id, reader_id, number, body[4 + to_inline_qos :])
+            self._from_unmatched(incoming, writer_id, reader_id, number, view[payload_start:end])
             return
         if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
-        payload = self._hooks.decode_payload(remote.guid, body[4 + to_inline_qos :])
+        payload = self._hooks.decode_payload(remote.guid, view[payload_start:end])
         if isinstance(payload, Outcome):
             self._undecodable(incoming, payload)
             return
@@ -216,7 +244,7 @@ class Inbound:
             number,
             bytes(payload),
             b"",
-            timestamp if timestamp is not None else self._engine.reception_ticks(incoming.now),
+            timestamp if timestamp is not None else self._engine.wall_ticks(),
         )
         self._change(incoming, remote, reader_id, change)
 
@@ -265,7 +293,7 @@ class Inbound:
             number,
             payload,
             b"",
-            timestamp if timestamp is not None else self._engine.reception_ticks(incoming.now),
+            timestamp if timestamp is not None else self._engine.wall_ticks(),
             key_hash=inline.key_hash,
             related=inline.related,
         )
@@ -286,7 +314,11 @@ class Inbound:
                 continue
             local = self._engine.local_readers[reader.guid]
             if local.keys is not None:
-                key = self._key(incoming, local, change)
+                try:
+                    key = local.key_of(change)
+                except MalformedSample as error:
+                    self._engine.sample_malformed(local, change, str(error))
+                    key = None
                 if key is None:
                     self._nothing(incoming, remote, reader.guid[12:], change.sequence_number)
                     continue
@@ -299,17 +331,8 @@ class Inbound:
                 self._engine.samples_lost(local, proxy, lost, change.sequence_number - lost, "best effort")
         if remote.asserts_by_data:
             self._engine.liveliness.writer_asserted(remote.guid, now)
-        if remote.defragmenter and not remote.data.qos.is_reliable:
+        if not remote.is_reliable:
             remote.defragmenter.notice_number(change.sequence_number)
-
-    def _key(self, incoming: Incoming, local: LocalReader, change: CacheChange) -> bytes | None:
-        """The instance's key; None (and counted) when the octets do not hold one."""
-        try:
-            key = local.key_of(change)
-        except MalformedSample as error:
-            self._engine.sample_malformed(local, change, str(error))
-            return None
-        return key
 
     def _from_unmatched(
         self,

@@ -13,7 +13,7 @@ from ddsi.behavior.stateful_reader import StatefulReader
 from ddsi.behavior.stateful_writer import StatefulWriter
 from ddsi.messages.packer import MessagePacker
 from ddsi.spi import ProtectedEndpoint
-from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import Guid
 from ddsi.structure.status import (
@@ -56,7 +56,6 @@ class LocalWriter:
         "assertion_due",
         "behavior",
         "data",
-        "dirty_since",
         "guid",
         "incompatible",
         "liveliness",
@@ -64,6 +63,7 @@ class LocalWriter:
         "packer",
         "protection",
         "receivers",
+        "timer_due",
         "wants_acknowledgment",
     )
 
@@ -77,7 +77,7 @@ class LocalWriter:
         self.matched = PublicationMatched()
         self.incompatible = OfferedIncompatibleQos()
         self.liveliness = LivelinessLost()
-        self.dirty_since = float("inf")
+        self.timer_due = float("inf")
         self.assertion_due = float("inf")
         self.wants_acknowledgment = 0  # how many wait for its progress
 
@@ -181,7 +181,7 @@ class LocalReader:
         """
         if self.keys is None:
             return b""
-        if change.kind == 0:
+        if change.kind is ChangeKind.ALIVE:
             return self.keys.from_payload(change.payload)
         if len(change.payload) >= 4:
             return self.keys.from_key_payload(change.payload)

@@ -397,7 +397,9 @@ class Participant:
             self.outbound.transmit(writer, behavior.unsent_changes(now))
         if writer.assertion_due != math.inf:
             self.liveliness.written(writer, now)
-        self._timers.set((Timer.WRITER, writer.guid), behavior.next_deadline())
+        due = behavior.next_deadline()
+        if due != writer.timer_due:
+            self._set_writer_timer(writer, due)
         if not self._flush_armed and not self.outbound.is_idle:
             self._flush_armed = True
             self._timers.set(Timer.FLUSH, now + _FLUSH_AFTER_S)
@@ -414,6 +416,8 @@ class Participant:
         """Hand a change to a reader of this participant."""
         writer_proxy = reader.behavior.writers[writer.guid]
         reader_proxy = writer.behavior.local_readers[reader.guid]
+        if reader.keys is not None and not change.key:
+            change.key = reader.key_of(change) or b""  # written when nobody here needed it
         reader.behavior.receive_data(writer_proxy, change, now)
         writer.behavior.local_reader_progress(reader_proxy, writer_proxy.next_sn - 1, now)
 
@@ -440,7 +444,7 @@ class Participant:
         """A writer decided to send these; its timer may have moved and somebody may wait for its progress."""
         if transmissions:
             self.outbound.transmit(writer, transmissions)
-        self._timers.set((Timer.WRITER, writer.guid), writer.behavior.next_deadline())
+        self._set_writer_timer(writer, writer.behavior.next_deadline())
         self.writer_progressed(writer)
 
     def writer_progressed(self, writer: LocalWriter) -> None:
@@ -529,11 +533,11 @@ class Participant:
         """The wall clock in ticks."""
         return ticks_from_nanoseconds(self._wall_clock())
 
-    def reception_ticks(self, now: float) -> int:
-        """The source timestamp of a sample that came without one."""
-        return self.wall_ticks()
-
     # --- timers ------------------------------------------------------------------------------------------
+
+    def _set_writer_timer(self, writer: LocalWriter, deadline: float) -> None:
+        writer.timer_due = deadline
+        self._timers.set((Timer.WRITER, writer.guid), deadline)
 
     def set_spdp_timer(self, deadline: float) -> None:
         self._timers.set(Timer.SPDP, deadline)
@@ -565,6 +569,7 @@ class Participant:
             case Timer.WRITER:
                 writer = self.local_writers.get(rest[0])
                 if writer is not None:
+                    writer.timer_due = math.inf
                     self.writer_answers(writer, writer.behavior.handle_timeout(now))
             case Timer.ACKNACK:
                 self._answer_writer(rest[0], rest[1], now)

@@ -46,26 +46,30 @@ Admission = _Verdict | Refused
 
 
 @dataclass(frozen=True, slots=True)
-class NotForUs:
+class Outcome:
+    """Why octets could not be decoded; one of the classes below."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotForUs(Outcome):
     """Protected for another participant: skipped in silence."""
 
 
 @dataclass(frozen=True, slots=True)
-class NoKeys:
+class NoKeys(Outcome):
     """The key with this identifier has not arrived (yet)."""
 
     key_id: bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Rejected:
+class Rejected(Outcome):
     """The octets were tampered with, replayed or malformed."""
 
     reason: str
 
 
 NOT_FOR_US = NotForUs()
-Outcome = NotForUs | NoKeys | Rejected
 
 
 @dataclass(frozen=True, slots=True)
