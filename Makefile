@@ -48,6 +48,14 @@ clean:  ## Remove what was made, the virtual environment too
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find $(PACKAGES) security -name __pycache__ -type d -prune -exec rm -rf {} +
 
+# An editable install finds the packages by a hook, which type checkers and editors do not run.  They do read .pth files.
+define NAME_THE_SOURCES
+import pathlib, sysconfig
+here = pathlib.Path.cwd()
+pathlib.Path(sysconfig.get_path('purelib'), 'ddsi-sources.pth').write_text(f'{here}\n{here / "typings"}\n')
+endef
+export NAME_THE_SOURCES
+
 # --- the virtual environment: each stamp file stands for what is installed in it ---
 
 $(VENV)/.made:
@@ -63,6 +71,7 @@ $(VENV)/.made:
 
 $(VENV)/.ready-to-run: $(VENV)/.made pyproject.toml
 	$(BIN)/python -m pip install --quiet -e '.[all]'
+	@$(BIN)/python -c "$$NAME_THE_SOURCES"
 	@touch $@
 
 $(VENV)/.ready-to-test: $(VENV)/.ready-to-run pyproject.toml
