@@ -32,7 +32,7 @@ def main(words: Sequence[str] | None = None) -> int:
     pairs = [(a, b) for a in peers for b in peers if not arguments.ours or OURS in (a, b)]
     for peer in peers:
         _announce(peer)
-    outcomes = trio.run(_run_all, cases, pairs, arguments.jobs, arguments.verbose)
+    outcomes = trio.run(_run_all, cases, pairs, arguments)
     if not (arguments.peer or arguments.case or arguments.ours):
         write_report(outcomes, peers, arguments.output)
         print(f"written: {arguments.output}/results.md and results.json")
@@ -52,6 +52,7 @@ def _parse(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--ours", action="store_true", help="only pairs with ours in them")
     parser.add_argument("--jobs", type=int, default=2, help="cases played at a time (default: 2)")
     parser.add_argument("--output", type=Path, default=RESULTS, help="folder of the results")
+    parser.add_argument("--captures", type=Path, metavar="FOLDER", help="keep a capture of each case there")
     parser.add_argument("-v", "--verbose", action="store_true", help="the transcripts of known limits too")
     return parser.parse_args(words)
 
@@ -66,18 +67,18 @@ def _announce(peer: Peer) -> None:
 
 
 async def _run_all(
-    cases: Sequence[Case], pairs: Sequence[tuple[Peer, Peer]], jobs: int, is_verbose: bool
+    cases: Sequence[Case], pairs: Sequence[tuple[Peer, Peer]], arguments: argparse.Namespace
 ) -> list[Outcome]:
     outcomes: dict[tuple[int, int], Outcome] = {}
-    places = trio.CapacityLimiter(jobs)
+    places = trio.CapacityLimiter(arguments.jobs)
 
     async def run_one(key: tuple[int, int], case: Case, publisher: Peer, subscriber: Peer) -> None:
         async with places:
-            outcome = outcomes[key] = await run_case(case, publisher, subscriber)
+            outcome = outcomes[key] = await run_case(case, publisher, subscriber, captures=arguments.captures)
         if outcome.verdict is not Verdict.NOT_APPLICABLE:
             names = f"{outcome.case:20} {outcome.publisher:>10} to {outcome.subscriber:10}"
             print(f"{names} {outcome.verdict.value:12} {outcome.seconds:5.1f} s  {outcome.reason}", flush=True)
-        if is_verbose and outcome.verdict is Verdict.KNOWN:
+        if arguments.verbose and outcome.verdict is Verdict.KNOWN:
             print(outcome.transcript)
 
     async with trio.open_nursery() as nursery:

@@ -54,6 +54,7 @@ FIELDS: Mapping[str, tuple[str, Reader]] = {
     "Bounds/MaxSampleSize": ("max_sample_size", parse_memory),
     "Bounds/MaxDefragOctets": ("max_defrag_octets", parse_memory),
     "Bounds/MaxReorderSamples": ("max_reorder_samples", parse_integer),
+    "Bounds/ReaderOctets": ("reader_octets", parse_memory),
     "Bounds/UnacknowledgedOctets": ("unacknowledged_octets", parse_memory),
     "Internal/MaxSampleSize": ("max_sample_size", parse_memory),
     "Internal/PrimaryReorderMaxSamples": ("max_reorder_samples", parse_integer),

@@ -132,6 +132,7 @@ Domain @Id
         MaxSampleSize
         MaxDefragOctets
         MaxReorderSamples
+        ReaderOctets
         UnacknowledgedOctets
     Tracing
         Category|EnableCategory

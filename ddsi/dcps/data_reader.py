@@ -93,7 +93,7 @@ class DataReader(Entity, Generic[T]):
 
     async def __anext__(self) -> Sample[T]:
         """Take the next sample, waiting for one.  Iteration ends when the reader is closed."""
-        await self._pump.checkpoint(trio.current_time())
+        await self._pump.checkpoint(self._pump.now())
         while True:
             taken = self._history.take_next()
             if taken is not None:
@@ -146,7 +146,7 @@ class DataReader(Entity, Generic[T]):
 
     async def wait(self, condition: ReadCondition | None = None) -> None:
         """Until there is a sample that fits ``condition`` (none given: one that has not been read)."""
-        await self._pump.checkpoint(trio.current_time())
+        await self._pump.checkpoint(self._pump.now())
         states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
         while not self._history.matches(selector=selector, **states):
             self._check_open()

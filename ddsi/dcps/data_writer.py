@@ -95,7 +95,7 @@ class DataWriter(Entity, Generic[T]):
         if self._is_closed:
             self._check_open()
         pump = self._pump
-        now = trio.current_time()
+        now = pump.now()
         await pump.checkpoint(now)
         writer = self._writer
         payload = self._serialize(sample)
@@ -122,7 +122,7 @@ class DataWriter(Entity, Generic[T]):
         self._check_open()
         if not self._is_keyed:
             raise PreconditionNotMet(f"topic {self._topic.name!r} has no key, so it has no instances to end")
-        now = trio.current_time()
+        now = self._pump.now()
         await self._pump.checkpoint(now)
         payload = self._serialize_key(sample)
         key = self._support.key(sample)
@@ -141,11 +141,11 @@ class DataWriter(Entity, Generic[T]):
         behavior = self._writer.behavior
         with trio.move_on_after(limit) if limit < math.inf else trio.CancelScope():
             while (reason := behavior.lacks_room(octets, key)) is not None:
-                self._pump.engine.request_acknowledgment(self._writer, trio.current_time())
+                self._pump.engine.request_acknowledgment(self._writer, self._pump.now())
                 self._pump.settle()
                 await self._wait_for_progress()
                 self._check_open()
-            return trio.current_time()
+            return self._pump.now()
         raise DdsTimeout(
             f"writer of {self._topic.name!r} found no room within max_blocking_time={limit} s: {reason}; "
             "its readers are too slow, or one of them does not answer"
@@ -172,7 +172,7 @@ class DataWriter(Entity, Generic[T]):
         with trio.move_on_after(timeout) if timeout is not None else trio.CancelScope():
             self._pump.settle()
             while behavior.min_acked_sn() < last_sn:
-                self._pump.engine.request_acknowledgment(self._writer, trio.current_time())
+                self._pump.engine.request_acknowledgment(self._writer, self._pump.now())
                 self._pump.settle()
                 await self._wait_for_progress()
                 self._check_open()

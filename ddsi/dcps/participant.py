@@ -7,8 +7,6 @@ socket is left behind.  What the body raises leaves as itself.
 from __future__ import annotations
 
 import math
-import os
-import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
@@ -21,7 +19,6 @@ from ddsi.config import Config
 from ddsi.config.environment import load_config
 from ddsi.discovery.matching import MatchRefusal
 from ddsi.engine import DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
-from ddsi.spi import load_hooks
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ddsi.structure.guid import Guid
@@ -137,12 +134,10 @@ class DomainParticipant(Entity):
 
     def _options(self) -> PumpOptions:
         properties = self._qos.properties
-        hooks = load_hooks(properties, entropy=os.urandom, wall_clock=time.time_ns)
         user_data = self._qos.user_data
         return PumpOptions(
             domain_id=self._domain_id,
             config=self._config,
-            hooks=hooks,
             entity_name=self._qos.entity_name or "",
             user_data=user_data.value if user_data is not None else b"",
             properties=properties,

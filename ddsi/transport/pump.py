@@ -23,7 +23,7 @@ import trio
 
 from ddsi.config import Config
 from ddsi.engine import Compute, Effect, Participant, ParticipantSetup, SendDatagram
-from ddsi.spi import PLAINTEXT, SecurityHooks
+from ddsi.spi import load_hooks
 from ddsi.structure.guid import GuidPrefix
 from ddsi.structure.locator import Locator
 from ddsi.structure.qos_policies import Properties
@@ -47,7 +47,6 @@ class PumpOptions:
 
     domain_id: int
     config: Config
-    hooks: SecurityHooks = PLAINTEXT
     entity_name: str = ""
     user_data: bytes = b""
     properties: Properties = field(default_factory=dict)
@@ -68,9 +67,12 @@ class Pump:
             now = trio.current_time()
             tracing = open_trace(options.config, self._files, epoch_offset=time.time() - now)
             self.engine = Participant(
-                self._setup(options), random=SystemRandom(), wall_clock=time.time_ns, hooks=options.hooks,
+                self._setup(options),
+                random=SystemRandom(),
+                wall_clock=time.time_ns,
+                hooks=load_hooks(options.properties, entropy=os.urandom, wall_clock=time.time_ns),
                 trace=trace or tracing,
-            )  # fmt: skip
+            )
         except BaseException:
             self._files.close()
             raise

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 
-from ..framework import DeadlineExceeded, ExpectationFailed, Unavailable, namespace, scenario
+from ..framework import (
+    DeadlineExceeded,
+    ExpectationFailed,
+    Namespace,
+    Unavailable,
+    capture,
+    namespace,
+    scenario,
+)
 from ..peers.peer import Peer
 from .cases import Case
 from .limits import known_limit
@@ -49,24 +60,38 @@ def missing_ability(case: Case, *peers: Peer) -> str | None:
     return None
 
 
-async def play(case: Case, publisher: Peer, subscriber: Peer) -> None:
-    """Plays the case; raises what went wrong, with the transcript as a note, or Unavailable."""
+async def play(case: Case, publisher: Peer, subscriber: Peer, *, captures: Path | None = None) -> None:
+    """Plays the case; raises what went wrong, with the transcript as a note, or Unavailable.
+
+    With a folder for captures, what passed the wire is kept there.
+    """
     publisher.locate()  # compiled before the clock runs
     subscriber.locate()
+    title = f"{case.name}-{publisher}-{subscriber}"
     with namespace() as host:
-        async with scenario(f"{case.name} {publisher}-{subscriber}", deadline=CASE_DEADLINE) as stage:
+        async with _capturing(host, captures, title), scenario(title, deadline=CASE_DEADLINE) as stage:
             options = case.publisher_options(), case.subscriber_options()
             await case.story(Cast(stage, host, host, publisher, subscriber, *options))
 
 
-async def run_case(case: Case, publisher: Peer, subscriber: Peer) -> Outcome:
+@asynccontextmanager
+async def _capturing(host: Namespace, folder: Path | None, title: str) -> AsyncIterator[None]:
+    if folder is None:
+        yield
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        async with capture(host, folder / f"{title}.pcapng"):
+            yield
+
+
+async def run_case(case: Case, publisher: Peer, subscriber: Peer, *, captures: Path | None = None) -> Outcome:
     """Plays the case and judges; never raises for what the peers do."""
     who = (case.name, publisher.name, subscriber.name)
     if reason := missing_ability(case, publisher, subscriber):
         return Outcome(*who, Verdict.NOT_APPLICABLE, reason=reason)
     began = time.monotonic()
     try:
-        await play(case, publisher, subscriber)
+        await play(case, publisher, subscriber, captures=captures)
     except Unavailable as error:
         return Outcome(*who, Verdict.UNAVAILABLE, reason=str(error))
     except (ExpectationFailed, DeadlineExceeded) as error:
