@@ -243,8 +243,14 @@ def _check_sizes(config: Config) -> None:
 
 
 def _check_bounds(config: Config) -> None:
-    for name in ("max_participants", "max_endpoints", "max_instances", "max_reorder_samples", "unacknowledged_octets",
-                 "reader_octets"):
+    for name in (
+        "max_participants",
+        "max_endpoints",
+        "max_instances",
+        "max_reorder_samples",
+        "unacknowledged_octets",
+        "reader_octets",
+    ):
         _check_number(name, getattr(config, name), 1, 0x7FFFFFFF_FFFFFFFF)
     # A DATA_FRAG's sampleSize is an unsigned long (RTPS 2.5 §9.4.5.5).
     _check_number("max_sample_size", config.max_sample_size, 1, 0xFFFFFFFF)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddsi.config import Config, load_config
+from ddsi.config.meanings import FIELDS, REFUSED
+from ddsi.config.vocabulary import DOMAIN, Word
 from ddsi.structure.errors import ConfigurationError
 
 FULL = """<?xml version="1.0" encoding="UTF-8"?>
@@ -93,6 +96,25 @@ def test_all_that_can_be_said() -> None:
         pcap_file="out.pcapng",
     )
     assert config.config_warnings == ()
+
+
+def test_every_field_has_its_element() -> None:
+    """A setting of Config that files cannot hold would be found out only by those who need it."""
+    by_element = {name.partition(".")[0] for name, _ in FIELDS.values()}
+    by_several = {"interfaces", "multicast", "peers", "trace_level"}
+    of_tests_only = {"vendor_id", "config_warnings"}
+    assert {item.name for item in dataclasses.fields(Config)} == by_element | by_several | of_tests_only
+
+
+def test_every_element_with_a_meaning_is_in_the_vocabulary() -> None:
+    for path in [*FIELDS, *REFUSED]:
+        word: Word | None = DOMAIN
+        element, _, attribute = path.partition("@")
+        for name in element.split("/"):
+            word = word.child(name) if word is not None else None
+        assert word is not None, path
+        assert word.path == element
+        assert not attribute or attribute in word.attributes.values()
 
 
 class TestWhereItStands:
