@@ -89,8 +89,8 @@ from .structure.qos_policies import (
 )
 from .structure.sample_info import InstanceState, SampleInfo, SampleState, ViewState
 from .structure.status import (
-    InconsistentTopic,
     Incompatibility,
+    InconsistentTopic,
     LivelinessChanged,
     LivelinessLost,
     OfferedDeadlineMissed,
@@ -142,9 +142,9 @@ __all__ = [
     "GroupData",
     "Guid",
     "ImmutablePolicy",
+    "Incompatibility",
     "InconsistentPolicy",
     "InconsistentTopic",
-    "Incompatibility",
     "InstanceState",
     "KeepAll",
     "KeepLast",

@@ -1,7 +1,8 @@
 """Defragmenter: joins the fragments of large samples.  Other name: defrag.
 
-RTPS 2.5 §8.4.14.1 (large data).  One per remote writer, whoever reads it, so that a large sample is joined once.  Samples are
-told apart by number and by whom they are addressed to, as a filtering writer may send one number to one reader only.
+RTPS 2.5 §8.4.14.1 (large data).  One per remote writer, whoever reads it, so that a large sample is joined once.
+Samples are told apart by number and by whom they are addressed to, as a filtering writer may send one number to one
+reader only.
 
 A sample's octets are allocated when its first fragment comes, as large as the fragment says, so both the size of one
 sample and the sum of all unfinished ones have a bound, and their number too.
@@ -12,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ddsi.structure.sequence_number import MAX_SET_BITS, NumberSet
+from ..structure.sequence_number import MAX_SET_BITS, NumberSet
 
 __all__ = ["AssemblyKey", "Defragmenter", "PartialSample"]
 
@@ -68,8 +69,6 @@ class PartialSample:
             index = self._arrived.find(0, index + 1, end)
 
 
-
-
 class Defragmenter:
     """The unfinished samples of one remote writer; ``max_octets`` and ``max_samples`` bound them."""
 
@@ -93,8 +92,15 @@ class Defragmenter:
         return self._octets
 
     def add(
-        self, key: AssemblyKey, *, sample_size: int, fragment_size: int, first: int, count: int,
-        fragments: bytes | memoryview, now: float
+        self,
+        key: AssemblyKey,
+        *,
+        sample_size: int,
+        fragment_size: int,
+        first: int,
+        count: int,
+        fragments: bytes | memoryview,
+        now: float,
     ) -> PartialSample | None:
         """Fragments of one sample: returns it when they complete it, None while some are missing or it was refused."""
         sample = self._partial.get(key)

@@ -1,12 +1,11 @@
 """The filtered path: each reader sees only the changes that are meant for it, and a GAP for all others.
 
 DDS-Security 1.1 §7.4.4 (BuiltinParticipantVolatileMessageSecure) and DDS-RTPS 2.5 §8.4.7.5 (DDS_FILTER).  The
-volatile secure topic carries keys from one participant to another over one writer with one sequence of
-numbers.  A sample is encrypted for one reader, so no other can read it, and to each of them its number must
-be explained: by a GAP in the datagram of the next sample that it does get, or in answer to its ACKNACK when that GAP was
-lost or never sent.  Each reader has a HEARTBEAT of its own, under its own key, that speaks of its own numbers
-only: ``last`` is ``lst_seq``, so a reader that has all of its samples is never asked again because
-somebody else lacks one.
+volatile secure topic carries keys from one participant to another over one writer with one sequence of numbers.  A
+sample is encrypted for one reader, so no other can read it, and to each of them its number must be explained: by a
+GAP in the datagram of the next sample that it does get, or in answer to its ACKNACK when that GAP was lost or never
+sent.  Each reader has a HEARTBEAT of its own, under its own key, that speaks of its own numbers only: ``last`` is
+``lst_seq``, so a reader that has all of its samples is never asked again because somebody else lacks one.
 
 Pure functions over a WriterHistoryCache and a ReaderProxy; writer-side content filters will use them too.
 """
@@ -15,9 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.sequence_number import MAX_SET_BITS, NumberSet
-
+from ..structure.cache_change import CacheChange
+from ..structure.sequence_number import MAX_SET_BITS, NumberSet
 from .reader_proxy import ReaderProxy
 from .transmissions import SendGap
 from .writer_history_cache import WriterHistoryCache
@@ -49,8 +47,8 @@ def gap_before(reader: ReaderProxy, change: CacheChange) -> SendGap | None:
 def gap_for(cache: WriterHistoryCache, reader: ReaderProxy, irrelevant: Iterable[int], end_sn: int) -> list[SendGap]:
     """GAPs for numbers (ascending) that the reader asked for in vain.
 
-    A run of irrelevant numbers is followed beyond what was asked, up to ``end_sn`` (exclusive), so that a reader which asks for a
-    long past gets one answer instead of one per 256 numbers.
+    A run of irrelevant numbers is followed beyond what was asked, up to ``end_sn`` (exclusive), so that a reader
+    which asks for a long past gets one answer instead of one per 256 numbers.
     """
     numbers = list(irrelevant)
     if not numbers:

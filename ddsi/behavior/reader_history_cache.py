@@ -11,11 +11,11 @@ from collections import deque
 from collections.abc import Callable
 from copy import copy
 
-from ddsi.structure.cache_change import CacheChange, ChangeKind, StatusInfo
-from ddsi.structure.guid import Guid
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.qos_policies import LENGTH_UNLIMITED, KeepLast
-from ddsi.structure.sample_info import (
+from ..structure.cache_change import CacheChange, ChangeKind, StatusInfo
+from ..structure.guid import Guid
+from ..structure.qos import EndpointQos
+from ..structure.qos_policies import LENGTH_UNLIMITED, KeepLast
+from ..structure.sample_info import (
     ANY_INSTANCE_STATE,
     ANY_SAMPLE_STATE,
     ANY_VIEW_STATE,
@@ -91,7 +91,9 @@ class ReaderHistoryCache:
         self._depth = qos.history.depth if isinstance(qos.history, KeepLast) else 0
         self._max_samples = limits.max_samples if limits.max_samples != unlimited else 0
         self._max_per_instance = limits.max_samples_per_instance if limits.max_samples_per_instance != unlimited else 0
-        self._max_instances = min(limits.max_instances, max_instances) if limits.max_instances != unlimited else max_instances
+        self._max_instances = (
+            min(limits.max_instances, max_instances) if limits.max_instances != unlimited else max_instances
+        )
         self._max_octets = max_octets
         self._is_reliable = qos.is_reliable
         self._clock_offset = clock_offset

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.discovered import DiscoveredReaderData
-from ddsi.structure.guid import GUID_UNKNOWN, EntityId, Guid
-from ddsi.structure.locator import Locator
-
+from ..structure.cache_change import CacheChange
+from ..structure.discovered import DiscoveredReaderData
+from ..structure.guid import GUID_UNKNOWN, EntityId, Guid
+from ..structure.locator import Locator
 from .schedules import NACK_RESPONSE_SUPPRESSION
 
 __all__ = ["ReaderProxy"]

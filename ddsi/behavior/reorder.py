@@ -13,8 +13,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Container, Iterator
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.sequence_number import MAX_SET_BITS, NumberSet
+from ..structure.cache_change import CacheChange
+from ..structure.sequence_number import MAX_SET_BITS, NumberSet
 
 __all__ = ["ReorderBuffer"]
 
@@ -56,7 +56,9 @@ class ReorderBuffer:
         if number in self._changes or self.is_irrelevant(number):
             return False
         size = len(change.payload)
-        if number != self.next_sn and (len(self._changes) >= self._max_samples or self._octets + size > self._max_octets):
+        if number != self.next_sn and (
+            len(self._changes) >= self._max_samples or self._octets + size > self._max_octets
+        ):
             return False
         self._changes[number] = change
         self._octets += size

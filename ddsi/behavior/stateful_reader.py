@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.discovered import DiscoveredWriterData
-from ddsi.structure.guid import Guid
-from ddsi.structure.locator import Locator
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.sequence_number import NumberSet
-
+from ..structure.cache_change import CacheChange
+from ..structure.discovered import DiscoveredWriterData
+from ..structure.guid import Guid
+from ..structure.locator import Locator
+from ..structure.qos import EndpointQos
+from ..structure.sequence_number import NumberSet
 from .defrag import Defragmenter, PartialSample
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
@@ -101,7 +100,10 @@ class StatefulReader:
         return proxy
 
     def matched_writer_remove(self, guid: Guid, now: float) -> WriterProxy | None:
-        """RTPS 2.5 §8.4.10.3.3.  What was waiting for a number that will not come any more is delivered before it goes."""
+        """RTPS 2.5 §8.4.10.3.3.
+
+        What was waiting for a number that will not come any more is delivered before it goes.
+        """
         proxy = self.writers.pop(guid, None)
         if proxy is not None and proxy.is_reliable:
             proxy.reorder.skip_to(proxy.last_seq + 1)
@@ -117,7 +119,11 @@ class StatefulReader:
         """
         number = change.sequence_number
         reorder = proxy.reorder
-        if number == reorder.next_sn and not reorder and (proxy.is_local or not proxy.schedule.is_preemptive or not proxy.is_reliable):
+        if (
+            number == reorder.next_sn
+            and not reorder
+            and (proxy.is_local or not proxy.schedule.is_preemptive or not proxy.is_reliable)
+        ):
             if number > proxy.last_seq:
                 proxy.last_seq = number
             if self.history.add(change, now):

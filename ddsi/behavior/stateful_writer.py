@@ -13,13 +13,12 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.discovered import DiscoveredReaderData
-from ddsi.structure.guid import GUID_UNKNOWN, Guid
-from ddsi.structure.locator import Locator
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.sequence_number import NumberSet
-
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.discovered import DiscoveredReaderData
+from ..structure.guid import GUID_UNKNOWN, Guid
+from ..structure.locator import Locator
+from ..structure.qos import EndpointQos
+from ..structure.sequence_number import NumberSet
 from .filtered import directed_heartbeat_range, gap_before, gap_for, is_irrelevant
 from .reader_proxy import ReaderProxy
 from .schedules import HeartbeatSchedule
@@ -71,7 +70,8 @@ class StatefulWriter:
         self._expiries: deque[tuple[float, int]] = deque()
 
     def __repr__(self) -> str:
-        return f"<StatefulWriter {self.guid} sent {self.next_unsent_sn - 1} of {self.cache.last_sn}, {len(self.readers)} readers>"
+        sent = f"sent {self.next_unsent_sn - 1} of {self.cache.last_sn}"
+        return f"<StatefulWriter {self.guid} {sent}, {len(self.readers)} readers>"
 
     # --- the application's side --------------------------------------------------------------------------
 
@@ -108,7 +108,10 @@ class StatefulWriter:
         destination: Guid = GUID_UNKNOWN,
         related: tuple[Guid, int] | None = None,
     ) -> CacheChange:
-        """Add a change to the history; RTPS 2.5 §8.2.7.1 (Writer::new_change).  It is sent by :meth:`unsent_changes`."""
+        """Add a change to the history; RTPS 2.5 §8.2.7.1 (Writer::new_change).
+
+        It is sent by :meth:`unsent_changes`.
+        """
         cache = self.cache
         lifespan = self.qos.lifespan.duration
         change = CacheChange(
@@ -157,7 +160,11 @@ class StatefulWriter:
         acked = self.next_unsent_sn - 1 if self.readers else self.cache.last_sn
         for proxies in (self.readers, self.local_readers):
             for proxy in proxies.values():
-                if proxy.is_reliable and proxy.acked_sn < acked and not (self.filters and proxy.acked_sn >= proxy.lst_seq):
+                if (
+                    proxy.is_reliable
+                    and proxy.acked_sn < acked
+                    and not (self.filters and proxy.acked_sn >= proxy.lst_seq)
+                ):
                     acked = proxy.acked_sn
         return acked
 
@@ -359,7 +366,11 @@ class StatefulWriter:
 
     def _mark_stalled(self, lagging: list[ReaderProxy], now: float) -> bool:
         """Readers that have not answered for a while no longer hold the window; returns whether that freed it."""
-        newly = [p for p in lagging if not p.is_stalled and now - p.progress_time > _STALLED_AFTER_S and self._window_is_full()]
+        newly = [
+            p
+            for p in lagging
+            if not p.is_stalled and now - p.progress_time > _STALLED_AFTER_S and self._window_is_full()
+        ]
         for proxy in newly:
             proxy.is_stalled = True
         if newly:
@@ -384,9 +395,7 @@ class StatefulWriter:
         if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:
             self._acknowledged(now)
         out = self._requested_changes(proxy, requested, now) if requested else []
-        if not final or (out and not self.filters):
-            out.append(self.directed_heartbeat(proxy))
-        elif out and proxy.acked_sn < proxy.lst_seq:
+        if not final or (out and not self.filters) or (out and proxy.acked_sn < proxy.lst_seq):
             out.append(self.directed_heartbeat(proxy))
         if proxy.acked_sn < self.next_unsent_sn - 1 and self.heartbeat.due == math.inf:
             self.heartbeat.written(now)
@@ -510,5 +519,3 @@ def _runs(numbers: list[int]) -> list[tuple[int, int]]:
         else:
             runs.append((number, number))
     return runs
-
-

@@ -6,8 +6,8 @@ change per participant that is resent again and again, to whoever may listen.
 
 from __future__ import annotations
 
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.guid import Guid
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.guid import Guid
 
 __all__ = ["StatelessWriter"]
 
@@ -27,7 +27,5 @@ class StatelessWriter:
     ) -> CacheChange:
         """Replace what is sent.  The sequence number ascends only when the content changes (RTPS 2.5 §8.5.3.3.2)."""
         self.last_sn += 1
-        self.latest = CacheChange(
-            kind, self.guid, self.last_sn, payload, key_hash, source_timestamp, key_hash=key_hash
-        )
+        self.latest = CacheChange(kind, self.guid, self.last_sn, payload, key_hash, source_timestamp, key_hash=key_hash)
         return self.latest

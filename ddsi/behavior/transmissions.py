@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.sequence_number import NumberSet
+from ..structure.cache_change import CacheChange
+from ..structure.sequence_number import NumberSet
 
 if TYPE_CHECKING:
     from .reader_proxy import ReaderProxy

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections import deque
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.qos_policies import LENGTH_UNLIMITED, KeepLast
+from ..structure.cache_change import CacheChange
+from ..structure.qos import EndpointQos
+from ..structure.qos_policies import LENGTH_UNLIMITED, KeepLast
 
 __all__ = ["WriterHistoryCache"]
 

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Container
 
-from ddsi.structure.discovered import DiscoveredWriterData
-from ddsi.structure.guid import EntityId, Guid
-from ddsi.structure.locator import Locator
-from ddsi.structure.sequence_number import NumberSet
-from ddsi.structure.vendor import CYCLONE, FAST_DDS, OPENDDS, RTI, RTI_MICRO, TWINOAKS
-
+from ..structure.discovered import DiscoveredWriterData
+from ..structure.guid import EntityId, Guid
+from ..structure.locator import Locator
+from ..structure.sequence_number import NumberSet
+from ..structure.vendor import CYCLONE, FAST_DDS, OPENDDS, RTI, RTI_MICRO, TWINOAKS
 from .reorder import ReorderBuffer
 from .schedules import AckNackSchedule
 from .transmissions import SendAckNack, SendNackFrag
@@ -166,7 +165,10 @@ class WriterProxy:
         return SendAckNack(NumberSet(base), self._acknack_count, final=False)
 
     def acknack(self, missing: NumberSet) -> SendAckNack:
-        """What is here and what is not.  Always final: no HEARTBEAT is wanted in return, but for those asked for data."""
+        """What is here and what is not.
+
+        Always final: no HEARTBEAT is wanted in return, but for those asked for data.
+        """
         self._acknack_count += 1
         return SendAckNack(missing, self._acknack_count, final=True)
 

@@ -1,4 +1,7 @@
-"""Conditions: which samples a reader shall wait for, read or take.  DDS 1.4 §2.2.2.5.8 (ReadCondition), .9 (QueryCondition)."""
+"""Conditions: which samples a reader shall wait for, read or take.
+
+DDS 1.4 §2.2.2.5.8 (ReadCondition), .9 (QueryCondition).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ddsi.structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE
+from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE
 
 __all__ = ["ReadCondition"]
 

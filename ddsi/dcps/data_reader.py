@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import trio
 
-from ddsi.engine import KeyCodec, LocalReader
-from ddsi.behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.errors import MalformedSample, PreconditionNotMet
-from ddsi.structure.guid import Guid
-from ddsi.structure.qos import EndpointQos, Qos, reader_qos
-from ddsi.structure.qos_policies import DataRepresentation, DataRepresentationId
-from ddsi.structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
-
+from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
+from ..engine import KeyCodec, LocalReader
+from ..structure.cache_change import CacheChange
+from ..structure.errors import MalformedSample, PreconditionNotMet
+from ..structure.guid import Guid
+from ..structure.qos import EndpointQos, Qos, reader_qos
+from ..structure.qos_policies import DataRepresentation, DataRepresentationId
+from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
 from .conditions import ReadCondition
 from .entity import Entity
 from .groups import Subscriber
@@ -36,7 +35,7 @@ class DataReader(Entity, Generic[T]):
     """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``, which never wait."""
 
     def __init__(self, parent: DomainParticipant | Subscriber, topic: Topic[T], qos: Qos | None = None) -> None:
-        """``qos`` goes before the subscriber's, and that before the topic's; the rest is the OMG's default (best effort).
+        """``qos`` goes before the subscriber's, and that before the topic's; the rest is the OMG's default.
 
         Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import trio
 
-from ddsi.engine import LocalWriter
-from ddsi.structure.cache_change import ChangeKind
-from ddsi.structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
-from ddsi.structure.guid import Guid
-from ddsi.structure.qos import EndpointQos, Qos, writer_qos
-from ddsi.structure.qos_policies import DataRepresentation, DataRepresentationId
-from ddsi.structure.status import PublicationMatched
-from ddsi.structure.time import Time
-
+from ..engine import LocalWriter
+from ..structure.cache_change import ChangeKind
+from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
+from ..structure.guid import Guid
+from ..structure.qos import EndpointQos, Qos, writer_qos
+from ..structure.qos_policies import DataRepresentation, DataRepresentationId
+from ..structure.status import PublicationMatched
+from ..structure.time import Time
 from .entity import Entity
 from .groups import Publisher
 from .topic import Topic
@@ -214,9 +213,7 @@ class DataWriter(Entity, Generic[T]):
         return self._writer.matched
 
 
-def _with_representation(
-    qos: EndpointQos, possible: tuple[DataRepresentationId, ...], topic: Topic[T]
-) -> EndpointQos:
+def _with_representation(qos: EndpointQos, possible: tuple[DataRepresentationId, ...], topic: Topic[T]) -> EndpointQos:
     """A writer offers one representation: the first that was asked for, else the type's own choice."""
     wanted = qos.data_representation.ids or possible[:1]
     if wanted[0] not in (DataRepresentationId.XCDR1, DataRepresentationId.XCDR2):

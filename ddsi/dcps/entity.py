@@ -11,9 +11,9 @@ from typing import TypeVar
 
 import trio
 
-from ddsi.structure.errors import AlreadyDeleted
-from ddsi.structure.qos import Qos
-from ddsi.structure.status import Status
+from ..structure.errors import AlreadyDeleted
+from ..structure.qos import Qos
+from ..structure.status import Status
 
 __all__ = ["Entity", "EventStream"]
 

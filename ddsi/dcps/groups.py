@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ddsi.structure.qos import Qos
-
+from ..structure.qos import Qos
 from .entity import Entity
 
 if TYPE_CHECKING:

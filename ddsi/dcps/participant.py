@@ -15,17 +15,16 @@ from typing import Self
 
 import trio
 
-from ddsi.config import Config
-from ddsi.config.environment import load_config
-from ddsi.discovery.matching import MatchRefusal
-from ddsi.engine import DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
-from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
-from ddsi.structure.guid import Guid
-from ddsi.structure.qos import Qos
-from ddsi.trace.sink import TraceSink
-from ddsi.transport import Pump, PumpOptions
-
+from ..config import Config
+from ..config.environment import load_config
+from ..discovery.matching import MatchRefusal
+from ..engine import DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
+from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
+from ..structure.guid import Guid
+from ..structure.qos import Qos
+from ..trace.sink import TraceSink
+from ..transport import Pump, PumpOptions
 from .entity import Entity
 
 __all__ = ["DomainParticipant"]
@@ -97,7 +96,8 @@ class DomainParticipant(Entity):
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        assert self._nursery is not None and self._manager is not None
+        assert self._nursery is not None
+        assert self._manager is not None
         try:
             if error is None:
                 await self._linger()
@@ -232,7 +232,9 @@ class DomainParticipant(Entity):
         assert self._pump is not None
         return self._pump.engine.guid
 
-    async def _wait_until(self, entity: Entity, holds: Callable[[], bool], timeout: float | None, otherwise: str) -> None:
+    async def _wait_until(
+        self, entity: Entity, holds: Callable[[], bool], timeout: float | None, otherwise: str
+    ) -> None:
         """Until ``holds``, looked at whenever the entity may have changed.  Raises DdsTimeout saying ``otherwise``."""
         entity._check_open()
         self._running_pump().before_waiting()

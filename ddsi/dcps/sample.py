@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-from ddsi.structure.sample_info import SampleInfo
+from ..structure.sample_info import SampleInfo
 
 __all__ = ["Sample"]
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from ddsi.structure.errors import BadParameter
-from ddsi.structure.qos import Qos
-from ddsi.xtypes.type_support import TypeSupport, type_support
-
+from ..structure.errors import BadParameter
+from ..structure.qos import Qos
+from ..xtypes.type_support import TypeSupport, type_support
 from .entity import Entity
 
 if TYPE_CHECKING:

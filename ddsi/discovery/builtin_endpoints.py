@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ddsi.structure import builtin_entity_ids as ids
-from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
-from ddsi.structure.guid import EntityId
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.qos_policies import KeepLast, Reliable, TransientLocal
+from ..structure import builtin_entity_ids as ids
+from ..structure.builtin_entity_ids import BuiltinEndpoints
+from ..structure.guid import EntityId
+from ..structure.qos import EndpointQos
+from ..structure.qos_policies import KeepLast, Reliable, TransientLocal
 
 __all__ = ["ANNOUNCED_ENDPOINTS", "BUILTIN_QOS", "BUILTIN_TOPICS", "BuiltinTopic"]
 

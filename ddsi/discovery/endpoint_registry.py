@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-from ddsi.structure.discovered import DiscoveredEndpointData
-from ddsi.structure.guid import Guid
+from ..structure.discovered import DiscoveredEndpointData
+from ..structure.guid import Guid
 
 __all__ = ["EndpointRegistry"]
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 
-from ddsi.structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.qos_policies import DataRepresentation, DataRepresentationId
-from ddsi.structure.status import Incompatibility
+from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.qos import EndpointQos
+from ..structure.qos_policies import DataRepresentation, DataRepresentationId
+from ..structure.status import Incompatibility
 
 __all__ = ["MatchRefusal", "RefusalKind", "incompatibilities", "judge", "partitions_match", "types_match"]
 
@@ -40,7 +40,8 @@ class RefusalKind(StrEnum):
 class MatchRefusal:
     """Why a writer and a reader of the same topic do not match, kept as a value because people will ask.
 
-    ``offered`` is the writer's side, ``requested`` the reader's; ``incompatibilities`` names every policy when it is QoS.
+    ``offered`` is the writer's side, ``requested`` the reader's; ``incompatibilities`` names every policy when it is
+    QoS.
     """
 
     kind: RefusalKind

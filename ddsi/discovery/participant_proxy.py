@@ -1,17 +1,18 @@
 """ParticipantProxy: what we know of one remote participant.  Other name: proxy_participant.
 
-RTPS 2.5 §8.5.3.2, and §8.5.3.3 for its lease.  It also remembers which hosts it really spoke from: nothing is sent to an address
-that a participant merely claims, or a stranger could point our traffic at somebody else (see ``reachable``).
+RTPS 2.5 §8.5.3.2, and §8.5.3.3 for its lease.  It also remembers which hosts it really spoke from: nothing is sent to
+an address that a participant merely claims, or a stranger could point our traffic at somebody else (see
+``reachable``).
 """
 
 from __future__ import annotations
 
 import math
 
-from ddsi.structure.discovered import DiscoveredParticipantData
-from ddsi.structure.guid import Guid, GuidPrefix
-from ddsi.structure.locator import Locator, LocatorKind
-from ddsi.structure.vendor import VendorId
+from ..structure.discovered import DiscoveredParticipantData
+from ..structure.guid import Guid, GuidPrefix
+from ..structure.locator import Locator, LocatorKind
+from ..structure.vendor import VendorId
 
 __all__ = ["ParticipantProxy"]
 

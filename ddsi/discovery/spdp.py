@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ddsi.structure.locator import Locator
+from ..structure.locator import Locator
 
 __all__ = ["SpdpAnnouncer"]
 

@@ -1,7 +1,7 @@
 """DiscoveryAgent: who is there, what endpoints they have, and telling them of ours.
 
-RTPS 2.5 §8.5.3 (SPDP) and §8.5.4 (SEDP).  Everything that strangers fill - participants, their endpoints - has its bound
-here.  A participant is admitted by the hooks before any of its endpoints is matched.
+RTPS 2.5 §8.5.3 (SPDP) and §8.5.4 (SEDP).  Everything that strangers fill - participants, their endpoints - has its
+bound here.  A participant is admitted by the hooks before any of its endpoints is matched.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ddsi.discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_QOS, BUILTIN_TOPICS, BuiltinTopic
-from ddsi.discovery.parameters import (
+from ..behavior.stateless_writer import StatelessWriter
+from ..discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_QOS, BUILTIN_TOPICS, BuiltinTopic
+from ..discovery.parameters import (
     decode_key,
     decode_participant,
     decode_reader,
@@ -20,28 +21,26 @@ from ddsi.discovery.parameters import (
     encode_reader,
     encode_writer,
 )
-from ddsi.discovery.participant_proxy import ParticipantProxy
-from ddsi.discovery.spdp import SpdpAnnouncer
-from ddsi.behavior.stateless_writer import StatelessWriter
-from ddsi.messages.data import Data
-from ddsi.serialization.parameter_id import ParameterId
-from ddsi.serialization.parameter_list import MustUnderstandUnknown, ParameterList
-from ddsi.spi import PENDING, Refused
-from ddsi.structure import builtin_entity_ids as ids
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.discovered import (
+from ..discovery.participant_proxy import ParticipantProxy
+from ..discovery.spdp import SpdpAnnouncer
+from ..messages.data import Data
+from ..serialization.parameter_id import ParameterId
+from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
+from ..spi import PENDING, Refused
+from ..structure import builtin_entity_ids as ids
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.discovered import (
     DiscoveredEndpointData,
     DiscoveredParticipantData,
     DiscoveredReaderData,
     DiscoveredWriterData,
 )
-from ddsi.structure.errors import MalformedMessage
-from ddsi.structure.guid import EntityId, Guid
-from ddsi.structure.locator import Locator
-from ddsi.structure.status import SecurityRefused
-from ddsi.trace import events
-from ddsi.trace.reasons import DropReason, LossReason
-
+from ..structure.errors import MalformedMessage
+from ..structure.guid import EntityId, Guid
+from ..structure.locator import Locator
+from ..structure.status import SecurityRefused
+from ..trace import events
+from ..trace.reasons import DropReason, LossReason
 from .inbound import Incoming
 
 if TYPE_CHECKING:
@@ -101,7 +100,7 @@ class DiscoveryAgent:
         self._send_spdp(destinations, change)
 
     def _unicast_only(self) -> list[Locator]:
-        """Participants that our multicast does not reach: they announce no multicast locator, or we do not multicast."""
+        """Participants that our multicast does not reach: they announce no multicast locator, or we have none."""
         we_multicast = bool(self.data.metatraffic_multicast)
         return [
             locator
@@ -178,7 +177,17 @@ class DiscoveryAgent:
         incoming.participant = proxy
         engine.set_lease_timer(proxy)
         if engine.trace is not None:
-            engine.trace(events.ParticipantDiscovered(now, engine.guid.prefix, data.guid, data.vendor_id, data.entity_name, data.lease_duration, data.metatraffic_unicast))
+            engine.trace(
+                events.ParticipantDiscovered(
+                    now,
+                    engine.guid.prefix,
+                    data.guid,
+                    data.vendor_id,
+                    data.entity_name,
+                    data.lease_duration,
+                    data.metatraffic_unicast,
+                )
+            )
         # One announcement for one received, so that the newcomer need not wait a period for ours.  A host that is only
         # announced and has not spoken gets no more than this one (DESIGN: no amplification).
         greeting = proxy.metatraffic or _first_unicast(data)
@@ -238,7 +247,17 @@ class DiscoveryAgent:
         before, proxy.data = proxy.data, data
         engine.set_lease_timer(proxy)
         if engine.trace is not None:
-            engine.trace(events.ParticipantChanged(now, engine.guid.prefix, data.guid, data.vendor_id, data.entity_name, data.lease_duration, data.metatraffic_unicast))
+            engine.trace(
+                events.ParticipantChanged(
+                    now,
+                    engine.guid.prefix,
+                    data.guid,
+                    data.vendor_id,
+                    data.entity_name,
+                    data.lease_duration,
+                    data.metatraffic_unicast,
+                )
+            )
         admission = engine.hooks.remote_participant_changed(data, now)
         if isinstance(admission, Refused):
             self.participant_lost(data.guid, LossReason.REJECTED_BY_SECURITY, now, admission.reason)
@@ -322,9 +341,7 @@ class DiscoveryAgent:
     def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float) -> None:
         self._prune_disposed()
         payload = encode_key(guid, ParameterId.ENDPOINT_GUID)
-        change = self._engine.write_builtin(
-            writer_id, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, payload, guid, now
-        )
+        change = self._engine.write_builtin(writer_id, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, payload, guid, now)
         self._disposed_announcements.append((writer_id, change.sequence_number))
 
     def _prune_disposed(self) -> None:
@@ -432,5 +449,3 @@ def _first_unicast(data: DiscoveredParticipantData) -> tuple[Locator, ...]:
         if not locator.is_multicast and not locator.is_unspecified:
             return (locator,)
     return ()
-
-

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ddsi.structure.guid import Guid
-from ddsi.structure.locator import Locator
-from ddsi.structure.status import Status
+from ..structure.guid import Guid
+from ..structure.locator import Locator
+from ..structure.status import Status
 
 __all__ = ["Compute", "DataAvailable", "DiscoveryChanged", "Effect", "SendDatagram", "StatusChanged", "WriterProgress"]
 

@@ -1,7 +1,7 @@
 """Inbound: a datagram becomes changes, gaps, heartbeats and acknowledgments for those they are meant for.
 
-RTPS 2.5 §8.3.4 (The RTPS Message Receiver).  Everything here is hostile until a MAC says otherwise: whatever a parser refuses ends
-the message, is counted, and goes no further.  DATA in its usual form takes a short path (``_data``); all
+RTPS 2.5 §8.3.4 (The RTPS Message Receiver).  Everything here is hostile until a MAC says otherwise: whatever a parser
+refuses ends the message, is counted, and goes no further.  DATA in its usual form takes a short path (``_data``); all
 else is decoded into the classes of ``messages``.
 """
 
@@ -11,28 +11,27 @@ import struct
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ddsi.behavior.stateful_reader import RemoteWriter
-from ddsi.behavior.writer_proxy import WriterProxy
-from ddsi.discovery.participant_proxy import ParticipantProxy
-from ddsi.messages.acknack import AckNack, NackFrag
-from ddsi.messages.data import Data
-from ddsi.messages.data_frag import DataFrag
-from ddsi.messages.fast import DATA_BODY, SUBMESSAGE_HEAD
-from ddsi.messages.gap import Gap
-from ddsi.messages.heartbeat import Heartbeat, HeartbeatFrag
-from ddsi.messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
-from ddsi.messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages
-from ddsi.serialization.parameter_id import ParameterId
-from ddsi.serialization.parameter_list import MustUnderstandUnknown, ParameterList
-from ddsi.spi import NoKeys, NotForUs, Octets, Outcome, Rejected
-from ddsi.structure.builtin_entity_ids import SPDP_WRITER
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.errors import MalformedMessage, MalformedSample
-from ddsi.structure.guid import Guid, GuidPrefix
-from ddsi.structure.locator import Locator
-from ddsi.structure.sequence_number import NumberSet
-from ddsi.trace.reasons import DropReason
-
+from ..behavior.stateful_reader import RemoteWriter
+from ..behavior.writer_proxy import WriterProxy
+from ..discovery.participant_proxy import ParticipantProxy
+from ..messages.acknack import AckNack, NackFrag
+from ..messages.data import Data
+from ..messages.data_frag import DataFrag
+from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD
+from ..messages.gap import Gap
+from ..messages.heartbeat import Heartbeat, HeartbeatFrag
+from ..messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
+from ..messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages
+from ..serialization.parameter_id import ParameterId
+from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
+from ..spi import NoKeys, NotForUs, Octets, Outcome, Rejected
+from ..structure.builtin_entity_ids import SPDP_WRITER
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.errors import MalformedMessage, MalformedSample
+from ..structure.guid import Guid, GuidPrefix
+from ..structure.locator import Locator
+from ..structure.sequence_number import NumberSet
+from ..trace.reasons import DropReason
 from .local_endpoints import LocalReader
 
 if TYPE_CHECKING:
@@ -51,7 +50,18 @@ _UNKNOWN_PREFIX = bytes(12)
 class Incoming:
     """The receiver's state for one message.  RTPS 2.5 §8.3.4, table 8.12.  Mutable, one per datagram."""
 
-    __slots__ = ("destination", "is_for_us", "now", "participant", "prefix", "protected", "source", "timestamp", "vendor_id", "version")
+    __slots__ = (
+        "destination",
+        "is_for_us",
+        "now",
+        "participant",
+        "prefix",
+        "protected",
+        "source",
+        "timestamp",
+        "vendor_id",
+        "version",
+    )
 
     def __init__(self, source: Locator, prefix: bytes, vendor_id: bytes, version: tuple[int, int], now: float) -> None:
         self.source = source
@@ -105,11 +115,13 @@ class Inbound:
         try:
             self._message(incoming, view)
         except MalformedMessage as error:
-            reason = DropReason.MUST_UNDERSTAND if isinstance(error, MustUnderstandUnknown) else DropReason.MALFORMED_MESSAGE
+            reason = (
+                DropReason.MUST_UNDERSTAND if isinstance(error, MustUnderstandUnknown) else DropReason.MALFORMED_MESSAGE
+            )
             self._engine.dropped(reason, source, str(error))
 
     def _identify(self, incoming: Incoming) -> None:
-        """Whoever spoke is alive: any datagram renews its lease (RTPS 2.5 §8.5.3.3.2 asks for SPDP alone; all stacks do this)."""
+        """Whoever spoke is alive: any datagram renews its lease (RTPS 2.5 §8.5.3.3.2 asks for SPDP)."""
         participant = self._engine.participants.get(incoming.prefix)
         incoming.participant = participant
         if participant is not None:
@@ -134,9 +146,9 @@ class Inbound:
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
         """Dispatch what lies in ``view[start:]``.
 
-        DATA and INFO_TS in their usual form are recognised here and take their short way; everything from the first other
-        submessage on is walked by ``iterate_submessages``, which knows all the rules.  Samples come in long runs, so
-        the walk returns to the short loop behind each HEARTBEAT or the like.
+        DATA and INFO_TS in their usual form are recognised here and take their short way; everything from the first
+        other submessage on is walked by ``iterate_submessages``, which knows all the rules.  Samples come in long
+        runs, so the walk returns to the short loop behind each HEARTBEAT or the like.
         """
         position, end = start, len(view)
         unpack_head = SUBMESSAGE_HEAD.unpack_from
@@ -381,13 +393,12 @@ class Inbound:
         self._add_fragments(incoming, remote, data, memoryview(fragments))
 
     def _is_wanted(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag) -> bool:
-        return any(
-            [
-                reader.fragment_received(proxy, data.writer_sn, incoming.now)
-                for reader, proxy in remote.readers
-                if data.reader_id in (_UNKNOWN_ID, reader.guid[12:])
-            ]
-        )
+        """Does any reader lack this sample?  Each is told that it exists."""
+        wanted = False
+        for reader, proxy in remote.readers:
+            if data.reader_id in (_UNKNOWN_ID, reader.guid[12:]):
+                wanted = reader.fragment_received(proxy, data.writer_sn, incoming.now) or wanted
+        return wanted
 
     def _add_fragments(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, fragments: memoryview) -> None:
         if len(fragments) < data.run_length:
@@ -414,9 +425,7 @@ class Inbound:
         if sample is not None:
             incoming.timestamp = sample.timestamp
             inline = _InlineQos.read(sample.inline_qos)
-            self._joined(
-                incoming, remote, data.reader_id, data.writer_sn, sample.octets, inline, is_key=data.is_key
-            )
+            self._joined(incoming, remote, data.reader_id, data.writer_sn, sample.octets, inline, is_key=data.is_key)
 
     # --- HEARTBEAT, GAP ----------------------------------------------------------------------------------
 
@@ -526,4 +535,3 @@ class _InlineQos:
 
 
 _NO_INLINE_QOS = _InlineQos()
-

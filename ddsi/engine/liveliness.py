@@ -10,17 +10,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ddsi.behavior.stateful_reader import RemoteWriter
-from ddsi.discovery.participant_message import ParticipantMessageData
-from ddsi.discovery.participant_proxy import ParticipantProxy
-from ddsi.structure.builtin_entity_ids import PARTICIPANT_MESSAGE_WRITER
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.discovered import DiscoveredWriterData
-from ddsi.structure.errors import MalformedMessage
-from ddsi.structure.guid import Guid
-from ddsi.structure.qos_policies import Automatic, ManualByParticipant, ManualByTopic
-from ddsi.trace import events
-
+from ..behavior.stateful_reader import RemoteWriter
+from ..discovery.participant_message import ParticipantMessageData
+from ..discovery.participant_proxy import ParticipantProxy
+from ..structure.builtin_entity_ids import PARTICIPANT_MESSAGE_WRITER
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.discovered import DiscoveredWriterData
+from ..structure.errors import MalformedMessage
+from ..structure.guid import Guid
+from ..structure.qos_policies import Automatic, ManualByParticipant, ManualByTopic
+from ..trace import events
 from .local_endpoints import LocalWriter
 
 if TYPE_CHECKING:

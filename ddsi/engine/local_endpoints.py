@@ -8,17 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from ddsi.behavior.reader_history_cache import ReaderHistoryCache
-from ddsi.behavior.stateful_reader import StatefulReader
-from ddsi.behavior.stateful_writer import StatefulWriter
-from ddsi.messages.packer import MessagePacker
-from ddsi.spi import ProtectedEndpoint
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.guid import Guid
-from ddsi.structure.status import (
-    InconsistentTopic,
+from ..behavior.reader_history_cache import ReaderHistoryCache
+from ..behavior.stateful_reader import StatefulReader
+from ..behavior.stateful_writer import StatefulWriter
+from ..messages.packer import MessagePacker
+from ..spi import ProtectedEndpoint
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ..structure.guid import Guid
+from ..structure.status import (
     Incompatibility,
+    InconsistentTopic,
     LivelinessChanged,
     LivelinessLost,
     OfferedIncompatibleQos,

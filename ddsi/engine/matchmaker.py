@@ -7,18 +7,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ddsi.behavior.defrag import Defragmenter
-from ddsi.behavior.stateful_reader import RemoteWriter
-from ddsi.discovery.matching import MatchRefusal, RefusalKind, judge
-from ddsi.discovery.participant_proxy import ParticipantProxy
-from ddsi.spi import PENDING, Admission, Refused
-from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.guid import Guid
-from ddsi.structure.locator import Locator
-from ddsi.structure.status import SecurityRefused
-from ddsi.trace import events
-from ddsi.trace.reasons import LossReason
-
+from ..behavior.defrag import Defragmenter
+from ..behavior.stateful_reader import RemoteWriter
+from ..discovery.matching import MatchRefusal, RefusalKind, judge
+from ..discovery.participant_proxy import ParticipantProxy
+from ..spi import PENDING, Admission, Refused
+from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ..structure.guid import Guid
+from ..structure.locator import Locator
+from ..structure.status import SecurityRefused
+from ..trace import events
+from ..trace.reasons import LossReason
 from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
@@ -106,9 +105,12 @@ class Matchmaker:
             return
         reader = self._engine.local_readers.get(local)
         writer_data = self._engine.known_writers.get(remote)
-        if reader is not None and writer_data is not None:
-            if self._admits(local, remote, writer_data.topic_name, admission):
-                self._match_writer(reader, writer_data, now)
+        if (
+            reader is not None
+            and writer_data is not None
+            and self._admits(local, remote, writer_data.topic_name, admission)
+        ):
+            self._match_writer(reader, writer_data, now)
 
     # --- pairs -------------------------------------------------------------------------------------------
 
@@ -123,9 +125,9 @@ class Matchmaker:
         if refusal is not None:
             if matched:
                 self._unmatch_reader(writer, data.guid, LossReason.QOS_CHANGED, now)
-            if self._refused(writer.guid, data.guid, data.topic_name, refusal):
-                if refusal.kind is RefusalKind.QOS:
-                    engine.status(writer.guid, writer.found_incompatible(data.guid, refusal.incompatibilities))
+            is_news = self._refused(writer.guid, data.guid, data.topic_name, refusal)
+            if is_news and refusal.kind is RefusalKind.QOS:
+                engine.status(writer.guid, writer.found_incompatible(data.guid, refusal.incompatibilities))
         elif matched:
             writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
         else:
@@ -164,11 +166,11 @@ class Matchmaker:
         if refusal is not None:
             if matched:
                 self._unmatch_local(writer, reader, LossReason.QOS_CHANGED, now)
-            if self._refused(writer.guid, reader.guid, writer.data.topic_name, refusal):
-                if refusal.kind is RefusalKind.QOS:
-                    reasons = refusal.incompatibilities
-                    self._engine.status(writer.guid, writer.found_incompatible(reader.guid, reasons))
-                    self._engine.status(reader.guid, reader.found_incompatible(writer.guid, reasons))
+            is_news = self._refused(writer.guid, reader.guid, writer.data.topic_name, refusal)
+            if is_news and refusal.kind is RefusalKind.QOS:
+                reasons = refusal.incompatibilities
+                self._engine.status(writer.guid, writer.found_incompatible(reader.guid, reasons))
+                self._engine.status(reader.guid, reader.found_incompatible(writer.guid, reasons))
         elif not matched and writer.guid not in self._engine.closing:
             self._match_local(writer, reader, now)
 
@@ -303,13 +305,27 @@ class Matchmaker:
             for reason in refusal.incompatibilities:
                 trace(
                     events.Incompatible(
-                        self._engine.now, prefix, local, remote, topic_name, reason.policy, reason.offered, reason.requested
+                        self._engine.now,
+                        prefix,
+                        local,
+                        remote,
+                        topic_name,
+                        reason.policy,
+                        reason.offered,
+                        reason.requested,
                     )
                 )
             if not refusal.incompatibilities:
                 trace(
                     events.Incompatible(
-                        self._engine.now, prefix, local, remote, topic_name, refusal.kind, refusal.offered, refusal.requested
+                        self._engine.now,
+                        prefix,
+                        local,
+                        remote,
+                        topic_name,
+                        refusal.kind,
+                        refusal.offered,
+                        refusal.requested,
                     )
                 )
         return True

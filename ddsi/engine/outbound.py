@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ddsi.behavior.reader_proxy import ReaderProxy
-from ddsi.behavior.transmissions import (
+from ..behavior.reader_proxy import ReaderProxy
+from ..behavior.transmissions import (
     SendAckNack,
     SendData,
     SendFragments,
@@ -21,22 +21,21 @@ from ddsi.behavior.transmissions import (
     SendNackFrag,
     WriterTransmission,
 )
-from ddsi.behavior.writer_proxy import WriterProxy
-from ddsi.messages import fast
-from ddsi.messages.acknack import AckNack, NackFrag
-from ddsi.messages.data import Data
-from ddsi.messages.data_frag import DataFrag
-from ddsi.messages.gap import Gap
-from ddsi.messages.heartbeat import Heartbeat, HeartbeatFrag
-from ddsi.messages.interpreter import InfoDestination
-from ddsi.messages.packer import MessagePacker
-from ddsi.serialization.parameter_id import ParameterId
-from ddsi.serialization.parameter_list import ParameterList
-from ddsi.spi import Octets, Parts, SecurityHooks
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.guid import EntityId, Guid, GuidPrefix
-from ddsi.structure.locator import Locator
-
+from ..behavior.writer_proxy import WriterProxy
+from ..messages import fast
+from ..messages.acknack import AckNack, NackFrag
+from ..messages.data import Data
+from ..messages.data_frag import DataFrag
+from ..messages.gap import Gap
+from ..messages.heartbeat import Heartbeat, HeartbeatFrag
+from ..messages.interpreter import InfoDestination
+from ..messages.packer import MessagePacker
+from ..serialization.parameter_id import ParameterId
+from ..serialization.parameter_list import ParameterList
+from ..spi import Octets, Parts, SecurityHooks
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.guid import EntityId, Guid, GuidPrefix
+from ..structure.locator import Locator
 from .effects import SendDatagram
 from .local_endpoints import LocalWriter
 
@@ -129,9 +128,7 @@ class Outbound:
         )
         self._append(writer, reader, data.encode(), change.source_timestamp)
 
-    def _send_fragment(
-        self, writer: LocalWriter, change: CacheChange, number: int, reader: ReaderProxy | None
-    ) -> None:
+    def _send_fragment(self, writer: LocalWriter, change: CacheChange, number: int, reader: ReaderProxy | None) -> None:
         size = writer.behavior.fragment_octets
         octets = memoryview(change.payload)[(number - 1) * size : number * size]
         payload = self._hooks.encode_payload(writer.guid, octets)
@@ -184,9 +181,7 @@ class Outbound:
 
     # --- readers -----------------------------------------------------------------------------------------
 
-    def answer(
-        self, reader: Guid, writer: WriterProxy, answers: Sequence[SendAckNack | SendNackFrag]
-    ) -> None:
+    def answer(self, reader: Guid, writer: WriterProxy, answers: Sequence[SendAckNack | SendNackFrag]) -> None:
         """ACKNACK and NACK_FRAG to one writer."""
         if not writer.locators:
             return
@@ -238,9 +233,7 @@ class Outbound:
                 self._emit_message(packer, (receiver,), locators)
 
     def _piggyback(self, writer: LocalWriter, item: SendHeartbeat) -> None:
-        octets = fast.heartbeat(
-            _UNKNOWN_ID, writer.guid[12:], item.first, item.last, item.count, final=item.final
-        )
+        octets = fast.heartbeat(_UNKNOWN_ID, writer.guid[12:], item.first, item.last, item.count, final=item.final)
         parts = self._hooks.encode_submessage(writer.guid, writer.receivers, (octets,))
         size = sum(map(len, parts))
         if not writer.packer.fits(size):
@@ -273,6 +266,8 @@ def _inline_qos(change: CacheChange) -> ParameterList | None:
         parameters.add(ParameterId.STATUS_INFO, bytes((0, 0, 0, change.kind)))
     if change.related is not None:
         guid, number = change.related
-        identity = guid + (number >> 32).to_bytes(4, "little", signed=True) + (number & 0xFFFFFFFF).to_bytes(4, "little")
+        identity = (
+            guid + (number >> 32).to_bytes(4, "little", signed=True) + (number & 0xFFFFFFFF).to_bytes(4, "little")
+        )
         parameters.add(ParameterId.RELATED_SAMPLE_IDENTITY, identity)
     return parameters

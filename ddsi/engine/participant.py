@@ -20,31 +20,31 @@ from enum import Enum
 from random import Random
 from typing import TypeVar
 
-from ddsi.behavior.reader_history_cache import ReaderHistoryCache
-from ddsi.behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
-from ddsi.behavior.stateful_writer import StatefulWriter
-from ddsi.behavior.transmissions import WriterTransmission
-from ddsi.behavior.writer_proxy import WriterProxy
-from ddsi.config import Config
-from ddsi.discovery.builtin_endpoints import BUILTIN_QOS, BUILTIN_TOPICS
-from ddsi.discovery.endpoint_registry import EndpointRegistry
-from ddsi.discovery.participant_proxy import ParticipantProxy
-from ddsi.messages.header import Header
-from ddsi.spi import PLAINTEXT, Compute as HookCompute, Decided, LocalParticipant, Octets, SecurityHooks, SendMessage
-from ddsi.structure import builtin_entity_ids as ids
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
-from ddsi.structure.locator import Locator
-from ddsi.structure.qos import EndpointQos
-from ddsi.structure.qos_policies import BinaryProperty, Properties, Property
-from ddsi.structure.status import SecurityRefused, Status
-from ddsi.structure.time import ticks_from_nanoseconds
-from ddsi.structure.vendor import PROTOCOL_VERSION
-from ddsi.trace import events
-from ddsi.trace.reasons import DropReason, LossReason, SampleLossReason
-from ddsi.trace.sink import TraceSink
-
+from ..behavior.reader_history_cache import ReaderHistoryCache
+from ..behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
+from ..behavior.stateful_writer import StatefulWriter
+from ..behavior.transmissions import WriterTransmission
+from ..behavior.writer_proxy import WriterProxy
+from ..config import Config
+from ..discovery.builtin_endpoints import BUILTIN_QOS, BUILTIN_TOPICS
+from ..discovery.endpoint_registry import EndpointRegistry
+from ..discovery.participant_proxy import ParticipantProxy
+from ..messages.header import Header
+from ..spi import PLAINTEXT, Decided, LocalParticipant, Octets, SecurityHooks, SendMessage
+from ..spi import Compute as HookCompute
+from ..structure import builtin_entity_ids as ids
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
+from ..structure.locator import Locator
+from ..structure.qos import EndpointQos
+from ..structure.qos_policies import BinaryProperty, Properties, Property
+from ..structure.status import SecurityRefused, Status
+from ..structure.time import ticks_from_nanoseconds
+from ..structure.vendor import PROTOCOL_VERSION
+from ..trace import events
+from ..trace.reasons import DropReason, LossReason, SampleLossReason
+from ..trace.sink import TraceSink
 from .discovery_agent import DiscoveryAgent
 from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
 from .inbound import Inbound
@@ -124,7 +124,10 @@ class Participant:
         hooks: SecurityHooks = PLAINTEXT,
         trace: TraceSink | None = None,
     ) -> None:
-        """``wall_clock()``: nanoseconds since 1970.  Raises NotAllowedBySecurity if the hooks refuse the participant."""
+        """``wall_clock()``: nanoseconds since 1970.
+
+        Raises NotAllowedBySecurity if the hooks refuse the participant.
+        """
         self.config = setup.config
         self.domain_id = setup.domain_id
         self.hooks = hooks
@@ -238,7 +241,14 @@ class Participant:
     # --- endpoints ---------------------------------------------------------------------------------------
 
     def create_writer(
-        self, topic_name: str, type_name: str, qos: EndpointQos, now: float, *, is_keyed: bool, filters: bool = False,
+        self,
+        topic_name: str,
+        type_name: str,
+        qos: EndpointQos,
+        now: float,
+        *,
+        is_keyed: bool,
+        filters: bool = False,
         type_information: bytes = b"",
     ) -> LocalWriter:
         """Create, announce and match a writer.  Raises NotAllowedBySecurity, and nothing has changed then."""
@@ -260,8 +270,15 @@ class Participant:
         return writer
 
     def create_reader(
-        self, topic_name: str, type_name: str, qos: EndpointQos, now: float, *, is_keyed: bool,
-        keys: KeyCodec | None = None, type_information: bytes = b"",
+        self,
+        topic_name: str,
+        type_name: str,
+        qos: EndpointQos,
+        now: float,
+        *,
+        is_keyed: bool,
+        keys: KeyCodec | None = None,
+        type_information: bytes = b"",
     ) -> LocalReader:
         """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then."""
         self.now = now
@@ -507,7 +524,9 @@ class Participant:
         self.status(reader.guid, reader.samples_lost(count, reason))
         if self.trace is not None:
             why = SampleLossReason.BEST_EFFORT if reason == "best effort" else SampleLossReason.NOT_AVAILABLE
-            self.trace(events.SampleLost(self.now, self.guid.prefix, reader.guid, proxy.guid, first, first + count - 1, why))
+            self.trace(
+                events.SampleLost(self.now, self.guid.prefix, reader.guid, proxy.guid, first, first + count - 1, why)
+            )
 
     def sample_malformed(self, reader: LocalReader, change: CacheChange, detail: str) -> None:
         """Octets that are no sample of the topic's type: lost, with the reason."""
@@ -517,7 +536,9 @@ class Participant:
             number = change.sequence_number
             why = SampleLossReason.MALFORMED_SAMPLE
             self.trace(
-                events.SampleLost(self.now, self.guid.prefix, reader.guid, change.writer_guid, number, number, why, detail)
+                events.SampleLost(
+                    self.now, self.guid.prefix, reader.guid, change.writer_guid, number, number, why, detail
+                )
             )
 
     def _sample_rejected(self, guid: Guid, reason: str) -> None:
@@ -637,7 +658,7 @@ class Participant:
                     self._effects.append(
                         Compute(asked.job, lambda result, now, asked=asked: self.hooks.computed(asked, result, now))  # type: ignore[misc]
                     )
-                case Decided(local, remote, admission):
+                case Decided():
                     self._decided(effect, self.now)
         self._timers.set(Timer.SECURITY, self.hooks.next_deadline())
 

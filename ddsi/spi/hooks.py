@@ -14,17 +14,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.discovered import (
+from ..structure.builtin_entity_ids import BuiltinEndpoints
+from ..structure.cache_change import CacheChange
+from ..structure.discovered import (
     DiscoveredParticipantData,
     DiscoveredReaderData,
     DiscoveredWriterData,
     Parameter,
 )
-from ddsi.structure.guid import EntityId, Guid, GuidPrefix
-from ddsi.structure.qos_policies import Properties
-
+from ..structure.guid import EntityId, Guid, GuidPrefix
+from ..structure.qos_policies import Properties
 from .outcomes import Admission, Outcome, Overhead
 
 __all__ = [

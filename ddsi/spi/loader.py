@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Protocol, cast
 
-from ddsi.structure.errors import ConfigurationError
-from ddsi.structure.qos_policies import Properties
-
+from ..structure.errors import ConfigurationError
+from ..structure.qos_policies import Properties
 from .hooks import SecurityHooks
 from .plaintext import PLAINTEXT
 
-__all__ = ["ENTRY_POINT_GROUP", "SECURITY_PROPERTY_PREFIX", "HooksFactory", "SPI_VERSION", "load_hooks"]
+__all__ = ["ENTRY_POINT_GROUP", "SECURITY_PROPERTY_PREFIX", "SPI_VERSION", "HooksFactory", "load_hooks"]
 
 ENTRY_POINT_GROUP = "ddsi.security"
 SECURITY_PROPERTY_PREFIX = "dds.sec."

@@ -11,8 +11,8 @@ from enum import Enum
 
 __all__ = [
     "ADMITTED",
-    "NO_OVERHEAD",
     "NOT_FOR_US",
+    "NO_OVERHEAD",
     "PENDING",
     "Admission",
     "NoKeys",

@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ddsi.structure.cache_change import CacheChange
-from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.guid import Guid, GuidPrefix
-
+from ..structure.cache_change import CacheChange
+from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.guid import Guid, GuidPrefix
 from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, Parts, ProtectedEndpoint
 from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
 

@@ -58,7 +58,9 @@ class Qos:
                 raise BadParameter(f"Qos({item.name}=...) takes {names}, not {value!r}")
         for name, value in self.properties.items():
             if not isinstance(name, str) or not isinstance(value, (str, p.Property, p.BinaryProperty)):
-                raise BadParameter(f"property {name!r} is a str, a Property or a BinaryProperty, not {type(value).__name__}")
+                raise BadParameter(
+                    f"property {name!r} is a str, a Property or a BinaryProperty, not {type(value).__name__}"
+                )
 
     def __or__(self, other: Qos) -> Qos:
         if not isinstance(other, Qos):
@@ -165,9 +167,7 @@ def reader_qos(qos: Qos) -> EndpointQos:
 
 def _resolve(qos: Qos, default: EndpointQos) -> EndpointQos:
     given = {
-        item.name: getattr(qos, item.name)
-        for item in fields(default)
-        if getattr(qos, item.name, None) is not None
+        item.name: getattr(qos, item.name) for item in fields(default) if getattr(qos, item.name, None) is not None
     }
     resolved = replace(default, **given)
     _check_consistency(resolved)

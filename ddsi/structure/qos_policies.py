@@ -393,8 +393,12 @@ class ReaderDataLifecycle:
     autopurge_disposed_samples_delay: float = math.inf
 
     def __post_init__(self) -> None:
-        _check_duration("ReaderDataLifecycle", "autopurge_nowriter_samples_delay", self.autopurge_nowriter_samples_delay)
-        _check_duration("ReaderDataLifecycle", "autopurge_disposed_samples_delay", self.autopurge_disposed_samples_delay)
+        _check_duration(
+            "ReaderDataLifecycle", "autopurge_nowriter_samples_delay", self.autopurge_nowriter_samples_delay
+        )
+        _check_duration(
+            "ReaderDataLifecycle", "autopurge_disposed_samples_delay", self.autopurge_disposed_samples_delay
+        )
 
 
 # --- types -----------------------------------------------------------------------------------------------

@@ -11,7 +11,15 @@ from .time import TICKS_PER_SECOND, Time
 if TYPE_CHECKING:
     from .cache_change import CacheChange
 
-__all__ = ["ANY_INSTANCE_STATE", "ANY_SAMPLE_STATE", "ANY_VIEW_STATE", "InstanceState", "SampleInfo", "SampleState", "ViewState"]
+__all__ = [
+    "ANY_INSTANCE_STATE",
+    "ANY_SAMPLE_STATE",
+    "ANY_VIEW_STATE",
+    "InstanceState",
+    "SampleInfo",
+    "SampleState",
+    "ViewState",
+]
 
 
 class SampleState(IntFlag):

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from .guid import GUID_UNKNOWN, Guid
 
 __all__ = [
-    "InconsistentTopic",
     "Incompatibility",
+    "InconsistentTopic",
     "LivelinessChanged",
     "LivelinessLost",
     "OfferedDeadlineMissed",

@@ -11,7 +11,14 @@ import struct
 import sys
 from dataclasses import dataclass
 
-__all__ = ["Interface", "allow_shared_port", "bind_address_for_group", "enlarge_buffer", "list_interfaces", "receive_only_joined_groups"]
+__all__ = [
+    "Interface",
+    "allow_shared_port",
+    "bind_address_for_group",
+    "enlarge_buffer",
+    "list_interfaces",
+    "receive_only_joined_groups",
+]
 
 _ETHERNET_MTU = 1500
 _LOOPBACK_MTU = 65536
@@ -45,7 +52,11 @@ if sys.platform != "win32":
     import fcntl
 
     # (SIOCGIFADDR, SIOCGIFNETMASK, SIOCGIFFLAGS, SIOCGIFMTU) and where a sockaddr keeps its four octets.
-    _REQUESTS = (0x8915, 0x891B, 0x8913, 0x8921) if sys.platform == "linux" else (0xC0206921, 0xC0206925, 0xC0206911, 0xC0206933)
+    _REQUESTS = (
+        (0x8915, 0x891B, 0x8913, 0x8921)
+        if sys.platform == "linux"
+        else (0xC0206921, 0xC0206925, 0xC0206911, 0xC0206933)
+    )
 
     def _from_ioctl() -> list[Interface]:
         interfaces = []

@@ -21,14 +21,13 @@ from random import SystemRandom
 
 import trio
 
-from ddsi.config import Config
-from ddsi.engine import Compute, Effect, Participant, ParticipantSetup, SendDatagram
-from ddsi.spi import load_hooks
-from ddsi.structure.guid import GuidPrefix
-from ddsi.structure.locator import Locator
-from ddsi.structure.qos_policies import Properties
-from ddsi.trace.sink import TraceSink
-
+from ..config import Config
+from ..engine import Compute, Effect, Participant, ParticipantSetup, SendDatagram
+from ..spi import load_hooks
+from ..structure.guid import GuidPrefix
+from ..structure.locator import Locator
+from ..structure.qos_policies import Properties
+from ..trace.sink import TraceSink
 from .trace_files import open_trace
 from .udp import UdpTransport
 
@@ -58,7 +57,9 @@ class Pump:
     ``on_effect`` takes every effect that is not about the network: data, statuses, progress.
     """
 
-    def __init__(self, options: PumpOptions, on_effect: Callable[[Effect], None], trace: TraceSink | None = None) -> None:
+    def __init__(
+        self, options: PumpOptions, on_effect: Callable[[Effect], None], trace: TraceSink | None = None
+    ) -> None:
         self._on_effect = on_effect
         self._files = ExitStack()
         self.transport = UdpTransport(options.domain_id, options.config)

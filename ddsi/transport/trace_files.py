@@ -6,10 +6,10 @@ import sys
 from contextlib import ExitStack
 from typing import TextIO
 
-from ddsi.config import Config
-from ddsi.structure.errors import ConfigurationError
-from ddsi.trace.pcapng import PcapngSink
-from ddsi.trace.sink import JsonLinesSink, TraceSink, tee
+from ..config import Config
+from ..structure.errors import ConfigurationError
+from ..trace.pcapng import PcapngSink
+from ..trace.sink import JsonLinesSink, TraceSink, tee
 
 __all__ = ["open_trace"]
 

@@ -12,10 +12,9 @@ import socket
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from ddsi.config import Config
-from ddsi.structure.errors import ConfigurationError, OutOfResources
-from ddsi.structure.locator import Locator, LocatorKind
-
+from ..config import Config
+from ..structure.errors import ConfigurationError, OutOfResources
+from ..structure.locator import Locator, LocatorKind
 from .platform import (
     Interface,
     allow_shared_port,
@@ -40,7 +39,9 @@ Octets = bytes | bytearray | memoryview
 class UdpTransport:
     """Opened at once by the constructor; :meth:`close` closes all.  Raises ConfigurationError, OutOfResources."""
 
-    def __init__(self, domain_id: int, config: Config, interfaces: Callable[[], list[Interface]] = list_interfaces) -> None:
+    def __init__(
+        self, domain_id: int, config: Config, interfaces: Callable[[], list[Interface]] = list_interfaces
+    ) -> None:
         self.interfaces = _choose(interfaces(), config.interfaces)
         self.uses_multicast = config.multicast is not False
         self._config = config
@@ -74,7 +75,9 @@ class UdpTransport:
         if self._config.max_message_size is not None:
             return self._config.max_message_size
         mtu = min(interface.mtu for interface in self.interfaces)
-        return min(_LOOPBACK_MESSAGE if self.is_loopback_only else _OTHER_MESSAGE, max(mtu - _IP_UDP_HEADERS, _OTHER_MESSAGE))
+        return min(
+            _LOOPBACK_MESSAGE if self.is_loopback_only else _OTHER_MESSAGE, max(mtu - _IP_UDP_HEADERS, _OTHER_MESSAGE)
+        )
 
     def unicast_locators(self) -> tuple[Locator, ...]:
         """Where this participant can be reached; loopback only when there is nothing else."""
@@ -228,7 +231,9 @@ class UdpTransport:
         for interface, sock in zip(self.interfaces, self.unicast, strict=True):
             if interface.reaches(locator.host):
                 return (sock,)
-        outward = [sock for interface, sock in zip(self.interfaces, self.unicast, strict=True) if not interface.is_loopback]
+        outward = [
+            sock for interface, sock in zip(self.interfaces, self.unicast, strict=True) if not interface.is_loopback
+        ]
         if locator.is_loopback:
             return ()  # another host's loopback, or ours without an interface there: it cannot be reached
         return tuple(outward[:1])
@@ -253,7 +258,9 @@ def _choose(available: list[Interface], wanted: tuple[str, ...]) -> list[Interfa
             found = [interface for interface in available if name in (interface.name, interface.address)]
             if not found:
                 names = ", ".join(f"{interface.name} ({interface.address})" for interface in available) or "none"
-                raise ConfigurationError(f"there is no interface {name!r} that is up and has an IPv4 address; there are: {names}")
+                raise ConfigurationError(
+                    f"there is no interface {name!r} that is up and has an IPv4 address; there are: {names}"
+                )
             chosen.extend(interface for interface in found if interface not in chosen)
     if not chosen:
         raise ConfigurationError("no network interface is up, not even loopback")
