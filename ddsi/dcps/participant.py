@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import trio
 
@@ -23,9 +23,11 @@ from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderDa
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import Qos
-from ..trace.sink import TraceSink
 from ..transport import Pump, PumpOptions
 from .entity import Entity
+
+if TYPE_CHECKING:
+    from ..trace.sink import TraceSink
 
 __all__ = ["DomainParticipant"]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from .. import trace as tracing
 from ..behavior.stateless_writer import StatelessWriter
 from ..discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_QOS, BUILTIN_TOPICS, BuiltinTopic
 from ..discovery.parameters import (
@@ -39,7 +40,6 @@ from ..structure.errors import MalformedMessage
 from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
-from ..trace import events
 from ..trace.reasons import DropReason, LossReason
 from .inbound import Incoming
 
@@ -178,7 +178,7 @@ class DiscoveryAgent:
         engine.set_lease_timer(proxy)
         if engine.trace is not None:
             engine.trace(
-                events.ParticipantDiscovered(
+                tracing.events.ParticipantDiscovered(
                     now,
                     engine.guid.prefix,
                     data.guid,
@@ -248,7 +248,7 @@ class DiscoveryAgent:
         engine.set_lease_timer(proxy)
         if engine.trace is not None:
             engine.trace(
-                events.ParticipantChanged(
+                tracing.events.ParticipantChanged(
                     now,
                     engine.guid.prefix,
                     data.guid,
@@ -289,7 +289,7 @@ class DiscoveryAgent:
             self._announcer.participant_lost(proxy.metatraffic, now)
             self._arm()
         if engine.trace is not None:
-            engine.trace(events.ParticipantLost(now, engine.guid.prefix, proxy.guid, reason, detail))
+            engine.trace(tracing.events.ParticipantLost(now, engine.guid.prefix, proxy.guid, reason, detail))
         engine.discovery_changed()
 
     def lease_due(self, prefix: bytes, now: float) -> None:
@@ -418,7 +418,7 @@ class DiscoveryAgent:
     def _note_endpoint(self, data: DiscoveredEndpointData, before: DiscoveredEndpointData | None, now: float) -> None:
         engine = self._engine
         if engine.trace is not None:
-            kind = events.EndpointDiscovered if before is None else events.EndpointChanged
+            kind = tracing.events.EndpointDiscovered if before is None else tracing.events.EndpointChanged
             engine.trace(kind(now, engine.guid.prefix, data.guid, data.topic_name, data.type_name))
         engine.discovery_changed()
 
@@ -440,7 +440,7 @@ class DiscoveryAgent:
         if proxy is not None:
             proxy.endpoint_count -= 1
         if engine.trace is not None:
-            engine.trace(events.EndpointLost(now, engine.guid.prefix, guid, reason))
+            engine.trace(tracing.events.EndpointLost(now, engine.guid.prefix, guid, reason))
         engine.discovery_changed()
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from .. import trace as tracing
 from ..behavior.stateful_reader import RemoteWriter
 from ..discovery.participant_message import ParticipantMessageData
 from ..discovery.participant_proxy import ParticipantProxy
@@ -19,7 +20,6 @@ from ..structure.discovered import DiscoveredWriterData
 from ..structure.errors import MalformedMessage
 from ..structure.guid import Guid
 from ..structure.qos_policies import Automatic, ManualByParticipant, ManualByTopic
-from ..trace import events
 from .local_endpoints import LocalWriter
 
 if TYPE_CHECKING:
@@ -189,4 +189,4 @@ class Liveliness:
             change = 1 if alive else -1
             engine.status(reader.guid, reader.liveliness_changed(remote.guid, alive=change, not_alive=-change))
             if engine.trace is not None:
-                engine.trace(events.LivelinessChanged(now, engine.guid.prefix, reader.guid, remote.guid, alive))
+                engine.trace(tracing.events.LivelinessChanged(now, engine.guid.prefix, reader.guid, remote.guid, alive))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .. import trace as tracing
 from ..behavior.defrag import Defragmenter
 from ..behavior.stateful_reader import RemoteWriter
 from ..discovery.matching import MatchRefusal, RefusalKind, judge
@@ -16,7 +17,6 @@ from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
-from ..trace import events
 from ..trace.reasons import LossReason
 from .local_endpoints import LocalReader, LocalWriter
 
@@ -304,7 +304,7 @@ class Matchmaker:
             prefix = self._engine.guid.prefix
             for reason in refusal.incompatibilities:
                 trace(
-                    events.Incompatible(
+                    tracing.events.Incompatible(
                         self._engine.now,
                         prefix,
                         local,
@@ -317,7 +317,7 @@ class Matchmaker:
                 )
             if not refusal.incompatibilities:
                 trace(
-                    events.Incompatible(
+                    tracing.events.Incompatible(
                         self._engine.now,
                         prefix,
                         local,
@@ -333,11 +333,13 @@ class Matchmaker:
     def _note_matched(self, local: Guid, remote: Guid, topic_name: str, now: float) -> None:
         self._drop(local, remote)
         if self._engine.trace is not None:
-            self._engine.trace(events.Matched(now, self._engine.guid.prefix, local, remote, topic_name))
+            self._engine.trace(tracing.events.Matched(now, self._engine.guid.prefix, local, remote, topic_name))
 
     def _note_unmatched(self, local: Guid, remote: Guid, topic_name: str, reason: LossReason, now: float) -> None:
         if self._engine.trace is not None:
-            self._engine.trace(events.Unmatched(now, self._engine.guid.prefix, local, remote, topic_name, reason))
+            self._engine.trace(
+                tracing.events.Unmatched(now, self._engine.guid.prefix, local, remote, topic_name, reason)
+            )
 
     def _drop(self, local: Guid, remote: Guid) -> None:
         self.refusals.pop((local, remote), None)

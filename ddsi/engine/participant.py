@@ -18,8 +18,9 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from random import Random
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
+from .. import trace as tracing
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
@@ -42,9 +43,7 @@ from ..structure.qos_policies import BinaryProperty, Properties, Property
 from ..structure.status import SecurityRefused, Status
 from ..structure.time import ticks_from_nanoseconds
 from ..structure.vendor import PROTOCOL_VERSION
-from ..trace import events
 from ..trace.reasons import DropReason, LossReason, SampleLossReason
-from ..trace.sink import TraceSink
 from .discovery_agent import DiscoveryAgent
 from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
 from .inbound import Inbound
@@ -53,6 +52,9 @@ from .local_endpoints import KeyCodec, LocalReader, LocalWriter
 from .matchmaker import Matchmaker
 from .outbound import Outbound, fragment_octets_for
 from .timers import Timers
+
+if TYPE_CHECKING:
+    from ..trace.sink import TraceSink
 
 __all__ = ["Participant", "ParticipantSetup", "Timer"]
 
@@ -173,7 +175,7 @@ class Participant:
         """Begin to announce; the first input."""
         self.now = now
         if self.trace is not None:
-            self.trace(events.ParticipantCreated(now, self.guid.prefix, self.domain_id, self.config.vendor_id))
+            self.trace(tracing.events.ParticipantCreated(now, self.guid.prefix, self.domain_id, self.config.vendor_id))
         self.discovery.start(now)
 
     def receive_datagram(self, octets: Octets, source: Locator, now: float) -> None:
@@ -182,7 +184,7 @@ class Participant:
             return
         self.now = now
         if self.trace is not None:
-            self.trace(events.MessageReceived(now, self.guid.prefix, source, bytes(octets)))
+            self.trace(tracing.events.MessageReceived(now, self.guid.prefix, source, bytes(octets)))
         self.inbound.receive(octets, source, now)
         if self._waiting:
             self._process_builtin_changes(now)
@@ -236,7 +238,7 @@ class Participant:
         for effect in self._effects[start:]:
             if isinstance(effect, SendDatagram):
                 octets = b"".join(effect.parts)
-                self.trace(events.MessageSent(self.now, self.guid.prefix, effect.destinations, octets))
+                self.trace(tracing.events.MessageSent(self.now, self.guid.prefix, effect.destinations, octets))
 
     # --- endpoints ---------------------------------------------------------------------------------------
 
@@ -329,7 +331,7 @@ class Participant:
         for timer in (Timer.WRITER, Timer.LINGER, Timer.WRITER_LIVELINESS):
             self._timers.cancel((timer, writer.guid))
         if self.trace is not None:
-            self.trace(events.EndpointClosed(now, self.guid.prefix, writer.guid))
+            self.trace(tracing.events.EndpointClosed(now, self.guid.prefix, writer.guid))
 
     def delete_reader(self, reader: LocalReader, now: float) -> None:
         self.now = now
@@ -341,7 +343,7 @@ class Participant:
         del self.local_readers[reader.guid]
         _remove_from_topic(self._readers_by_topic, reader.data.topic_name, reader.guid)
         if self.trace is not None:
-            self.trace(events.EndpointClosed(now, self.guid.prefix, reader.guid))
+            self.trace(tracing.events.EndpointClosed(now, self.guid.prefix, reader.guid))
 
     def close(self, now: float) -> None:
         """Goodbye: endpoints first, then the participant.  The effects that this leaves must still be drained."""
@@ -356,7 +358,7 @@ class Participant:
         self.discovery.say_goodbye()
         self._is_closed = True
         if self.trace is not None:
-            self.trace(events.ParticipantClosed(now, self.guid.prefix))
+            self.trace(tracing.events.ParticipantClosed(now, self.guid.prefix))
 
     def user_writers(self, topic_name: str | None = None) -> list[LocalWriter]:
         """The application's writers, of all topics or of one."""
@@ -403,7 +405,9 @@ class Participant:
         )
         if self.trace is not None:
             self.trace(
-                events.ChangeWritten(now, self.guid.prefix, writer.guid, change.sequence_number, kind, len(payload))
+                tracing.events.ChangeWritten(
+                    now, self.guid.prefix, writer.guid, change.sequence_number, kind, len(payload)
+                )
             )
         if behavior.local_readers:
             for guid in list(behavior.local_readers):
@@ -505,7 +509,9 @@ class Participant:
     def status(self, entity: Guid, status: Status) -> None:
         self._effects.append(StatusChanged(entity, status))
         if self.trace is not None:
-            self.trace(events.StatusChanged(self.now, self.guid.prefix, entity, type(status).__name__, repr(status)))
+            self.trace(
+                tracing.events.StatusChanged(self.now, self.guid.prefix, entity, type(status).__name__, repr(status))
+            )
 
     def discovery_changed(self) -> None:
         if not self._effects or not isinstance(self._effects[-1], DiscoveryChanged):
@@ -515,7 +521,7 @@ class Participant:
         """Count something that was not acted upon."""
         self.drops[reason] += 1
         if self.trace is not None:
-            self.trace(events.Dropped(self.now, self.guid.prefix, reason, source, detail))
+            self.trace(tracing.events.Dropped(self.now, self.guid.prefix, reason, source, detail))
 
     def dropped_discovery(self, change: CacheChange, detail: str) -> None:
         self.dropped(DropReason.MALFORMED_DISCOVERY_DATA, None, f"{change.writer_guid}: {detail}")
@@ -525,7 +531,9 @@ class Participant:
         if self.trace is not None:
             why = SampleLossReason.BEST_EFFORT if reason == "best effort" else SampleLossReason.NOT_AVAILABLE
             self.trace(
-                events.SampleLost(self.now, self.guid.prefix, reader.guid, proxy.guid, first, first + count - 1, why)
+                tracing.events.SampleLost(
+                    self.now, self.guid.prefix, reader.guid, proxy.guid, first, first + count - 1, why
+                )
             )
 
     def sample_malformed(self, reader: LocalReader, change: CacheChange, detail: str) -> None:
@@ -536,7 +544,7 @@ class Participant:
             number = change.sequence_number
             why = SampleLossReason.MALFORMED_SAMPLE
             self.trace(
-                events.SampleLost(
+                tracing.events.SampleLost(
                     self.now, self.guid.prefix, reader.guid, change.writer_guid, number, number, why, detail
                 )
             )
@@ -581,7 +589,7 @@ class Participant:
     def _fire(self, key: Hashable, now: float) -> None:
         timer, *rest = key if isinstance(key, tuple) else (key,)
         if self.trace is not None:
-            self.trace(events.TimerFired(now, self.guid.prefix, timer.name.lower(), now))
+            self.trace(tracing.events.TimerFired(now, self.guid.prefix, timer.name.lower(), now))
         match timer:
             case Timer.SPDP:
                 self.discovery.announce_due(now)
@@ -712,7 +720,9 @@ class Participant:
 
     def _trace_created(self, data: DiscoveredWriterData | DiscoveredReaderData, now: float) -> None:
         if self.trace is not None:
-            self.trace(events.EndpointCreated(now, self.guid.prefix, data.guid, data.topic_name, data.type_name))
+            self.trace(
+                tracing.events.EndpointCreated(now, self.guid.prefix, data.guid, data.topic_name, data.type_name)
+            )
 
 
 def _remove_from_topic(table: dict[str, dict[Guid, _Endpoint]], topic_name: str, guid: Guid) -> None:

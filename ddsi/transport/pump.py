@@ -18,6 +18,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from random import SystemRandom
+from typing import TYPE_CHECKING
 
 import trio
 
@@ -27,9 +28,10 @@ from ..spi import load_hooks
 from ..structure.guid import GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos_policies import Properties
-from ..trace.sink import TraceSink
-from .trace_files import open_trace
 from .udp import UdpTransport
+
+if TYPE_CHECKING:
+    from ..trace.sink import TraceSink
 
 __all__ = ["Pump", "PumpOptions"]
 
@@ -66,13 +68,14 @@ class Pump:
         self._files.callback(self.transport.close)
         try:
             now = trio.current_time()
-            tracing = open_trace(options.config, self._files, epoch_offset=time.time() - now)
+            if trace is None:
+                trace = self._configured_trace(options.config, now)
             self.engine = Participant(
                 self._setup(options),
                 random=SystemRandom(),
                 wall_clock=time.time_ns,
                 hooks=load_hooks(options.properties, entropy=os.urandom, wall_clock=time.time_ns),
-                trace=trace or tracing,
+                trace=trace,
             )
         except BaseException:
             self._files.close()
@@ -87,6 +90,13 @@ class Pump:
         self._limiter = trio.CapacityLimiter(_COMPUTE_THREADS)
         self._operations = 0
         self._last_yield = -math.inf
+
+    def _configured_trace(self, config: Config, now: float) -> TraceSink | None:
+        if not config.trace_file and not config.pcap_file:
+            return None
+        from .trace_files import open_trace  # the classes of the events cost start-up time that few need to pay
+
+        return open_trace(config, self._files, epoch_offset=time.time() - now)
 
     def _setup(self, options: PumpOptions) -> ParticipantSetup:
         locators = self.transport.unicast_locators()
