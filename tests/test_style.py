@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted([*(ROOT / "ddsi").rglob("*.py"), *(ROOT / "security").rglob("*.py")])
-LONGEST = 750
+LONGEST = 800
 """Lines.  Most modules have 80 to 350; one that outgrows this has a second noun in it."""
 
 
