@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from .. import trace as tracing
 from ..behavior.stateless_writer import StatelessWriter
 from ..discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_QOS, BUILTIN_TOPICS, BuiltinTopic
 from ..discovery.parameters import (
@@ -128,7 +127,7 @@ class DiscoveryAgent:
         self._engine.send_spdp(data.encode(), destinations)
 
     def _arm(self) -> None:
-        self._engine.set_spdp_timer(self._announcer.next_deadline())
+        self._engine.alarms.announce_at(self._announcer.next_deadline())
 
     # --- participants ------------------------------------------------------------------------------------
 
@@ -175,19 +174,8 @@ class DiscoveryAgent:
         proxy = engine.participants[data.guid.prefix] = ParticipantProxy(data, now)
         proxy.heard_from(incoming.source)
         incoming.participant = proxy
-        engine.set_lease_timer(proxy)
-        if engine.trace is not None:
-            engine.trace(
-                tracing.events.ParticipantDiscovered(
-                    now,
-                    engine.guid.prefix,
-                    data.guid,
-                    data.vendor_id,
-                    data.entity_name,
-                    data.lease_duration,
-                    data.metatraffic_unicast,
-                )
-            )
+        engine.alarms.lease(proxy)
+        engine.recorder.participant(data, is_new=True)
         # One announcement for one received, so that the newcomer need not wait a period for ours.  A host that is only
         # announced and has not spoken gets no more than this one (DESIGN: no amplification).
         greeting = proxy.metatraffic or _first_unicast(data)
@@ -245,19 +233,8 @@ class DiscoveryAgent:
         if data == proxy.data:
             return
         before, proxy.data = proxy.data, data
-        engine.set_lease_timer(proxy)
-        if engine.trace is not None:
-            engine.trace(
-                tracing.events.ParticipantChanged(
-                    now,
-                    engine.guid.prefix,
-                    data.guid,
-                    data.vendor_id,
-                    data.entity_name,
-                    data.lease_duration,
-                    data.metatraffic_unicast,
-                )
-            )
+        engine.alarms.lease(proxy)
+        engine.recorder.participant(data, is_new=False)
         admission = engine.hooks.remote_participant_changed(data, now)
         if isinstance(admission, Refused):
             self.participant_lost(data.guid, LossReason.REJECTED_BY_SECURITY, now, admission.reason)
@@ -283,13 +260,12 @@ class DiscoveryAgent:
             reader = engine.local_readers[Guid.of(engine.guid.prefix, topic.reader_id)]
             engine.matchmaker.detach_writer(reader, Guid.of(proxy.prefix, topic.writer_id), now)
         del engine.participants[proxy.prefix]
-        engine.cancel_lease_timer(proxy)
+        engine.alarms.no_lease(proxy)
         engine.hooks.remote_participant_lost(proxy.guid)
         if reason is LossReason.LEASE_EXPIRED:
             self._announcer.participant_lost(proxy.metatraffic, now)
             self._arm()
-        if engine.trace is not None:
-            engine.trace(tracing.events.ParticipantLost(now, engine.guid.prefix, proxy.guid, reason, detail))
+        engine.recorder.participant_lost(proxy.guid, reason, detail)
         engine.discovery_changed()
 
     def lease_due(self, prefix: bytes, now: float) -> None:
@@ -299,7 +275,7 @@ class DiscoveryAgent:
         if proxy.lease_due <= now:
             self.participant_lost(proxy.guid, LossReason.LEASE_EXPIRED, now)
         else:
-            self._engine.set_lease_timer(proxy)
+            self._engine.alarms.lease(proxy)
 
     def ignore(self, guid: Guid, now: float) -> None:
         """Act as if this participant were not there.  DDS 1.4 §2.2.2.2.1.14 (ignore_participant)."""
@@ -417,9 +393,7 @@ class DiscoveryAgent:
 
     def _note_endpoint(self, data: DiscoveredEndpointData, before: DiscoveredEndpointData | None, now: float) -> None:
         engine = self._engine
-        if engine.trace is not None:
-            kind = tracing.events.EndpointDiscovered if before is None else tracing.events.EndpointChanged
-            engine.trace(kind(now, engine.guid.prefix, data.guid, data.topic_name, data.type_name))
+        engine.recorder.endpoint(data, is_new=before is None)
         engine.discovery_changed()
 
     def _writer_lost(self, guid: Guid, reason: LossReason, now: float) -> None:
@@ -439,8 +413,7 @@ class DiscoveryAgent:
         proxy = engine.participants.get(guid.prefix)
         if proxy is not None:
             proxy.endpoint_count -= 1
-        if engine.trace is not None:
-            engine.trace(tracing.events.EndpointLost(now, engine.guid.prefix, guid, reason))
+        engine.recorder.endpoint_lost(guid, reason)
         engine.discovery_changed()
 
 

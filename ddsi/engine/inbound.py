@@ -31,7 +31,7 @@ from ..structure.errors import MalformedMessage, MalformedSample
 from ..structure.guid import Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.sequence_number import NumberSet
-from ..trace.reasons import DropReason
+from ..trace.reasons import DropReason, SampleLossReason
 from .local_endpoints import LocalReader
 
 if TYPE_CHECKING:
@@ -340,7 +340,9 @@ class Inbound:
             if proxy.schedule.due != due:
                 self._engine.proxy_touched(reader, proxy)
             if lost:
-                self._engine.samples_lost(local, proxy, lost, change.sequence_number - lost, "best effort")
+                self._engine.samples_lost(
+                    local, proxy, lost, change.sequence_number - lost, SampleLossReason.BEST_EFFORT
+                )
         if remote.asserts_by_data:
             self._engine.liveliness.writer_asserted(remote.guid, now)
         if not remote.is_reliable:
@@ -453,7 +455,7 @@ class Inbound:
                 proxy, heartbeat.first_sn, heartbeat.last_sn, heartbeat.count, incoming.now, final=heartbeat.final
             )
             if lost:
-                self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, "no longer available")
+                self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
             self._engine.proxy_touched(local.behavior, proxy)
         if heartbeat.liveliness and incoming.is_for_us:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
@@ -486,9 +488,12 @@ class Inbound:
         if not incoming.protected and not self._hooks.admits_clear_submessage(reader_guid):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
+        acked_sn = proxy.acked_sn
         answers = writer.behavior.receive_acknack(
             proxy, acknack.reader_sn_state, acknack.count, incoming.now, final=acknack.final
         )
+        if proxy.acked_sn > acked_sn:
+            self._engine.recorder.acknowledged(writer.guid, reader_guid, proxy.acked_sn)
         self._engine.writer_answers(writer, answers)
 
     def _nack_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:

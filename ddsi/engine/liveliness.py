@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .. import trace as tracing
 from ..behavior.stateful_reader import RemoteWriter
 from ..discovery.participant_message import ParticipantMessageData
 from ..discovery.participant_proxy import ParticipantProxy
@@ -45,10 +44,10 @@ class Liveliness:
         if policy.lease_duration == math.inf:
             return
         if isinstance(policy, Automatic):
-            self._engine.set_assertion_timer(now)
+            self._engine.alarms.assertion(now)
         else:
             writer.assertion_due = now + policy.lease_duration
-            self._engine.set_writer_liveliness_timer(writer)
+            self._engine.alarms.writer_liveliness(writer)
 
     def assertion_period(self) -> float:
         """Seconds between automatic assertions: 80 % of the shortest lease below 10 s, else 2 s before its end."""
@@ -90,7 +89,7 @@ class Liveliness:
         policy = writer.data.qos.liveliness
         if isinstance(policy, kind) and policy.lease_duration < math.inf:
             writer.assertion_due = now + policy.lease_duration
-            self._engine.set_writer_liveliness_timer(writer)
+            self._engine.alarms.writer_liveliness(writer)
 
     def writer_due(self, writer: LocalWriter, now: float) -> None:
         """Not asserted in time: the application is told, once."""
@@ -124,11 +123,11 @@ class Liveliness:
     def remote_writer_matched(self, data: DiscoveredWriterData, now: float) -> None:
         if data.qos.liveliness.lease_duration < math.inf:
             self._asserted.setdefault(data.guid, now)
-            self._engine.set_remote_liveliness_timer(data.guid, now + data.qos.liveliness.lease_duration)
+            self._engine.alarms.remote_liveliness(data.guid, now + data.qos.liveliness.lease_duration)
 
     def remote_writer_gone(self, guid: Guid) -> None:
         self._asserted.pop(guid, None)
-        self._engine.set_remote_liveliness_timer(guid, math.inf)
+        self._engine.alarms.remote_liveliness(guid, math.inf)
 
     def writer_asserted(self, guid: Guid, now: float) -> None:
         """A HEARTBEAT with the liveliness flag, or DATA, of a manual-by-topic writer."""
@@ -146,7 +145,7 @@ class Liveliness:
         lease = remote.data.qos.liveliness.lease_duration
         due = self._last_sign(remote) + lease
         if due > now:
-            self._engine.set_remote_liveliness_timer(guid, due)
+            self._engine.alarms.remote_liveliness(guid, due)
             return
         participant = remote.participant
         if isinstance(participant, ParticipantProxy):
@@ -178,7 +177,7 @@ class Liveliness:
     def _set_alive(self, remote: RemoteWriter, now: float, *, alive: bool) -> None:
         engine = self._engine
         if alive:
-            engine.set_remote_liveliness_timer(remote.guid, now + remote.data.qos.liveliness.lease_duration)
+            engine.alarms.remote_liveliness(remote.guid, now + remote.data.qos.liveliness.lease_duration)
         for behavior, proxy in remote.readers:
             if proxy.is_alive == alive:
                 continue
@@ -188,5 +187,4 @@ class Liveliness:
                 reader.history.writer_lost(remote.guid, now)
             change = 1 if alive else -1
             engine.status(reader.guid, reader.liveliness_changed(remote.guid, alive=change, not_alive=-change))
-            if engine.trace is not None:
-                engine.trace(tracing.events.LivelinessChanged(now, engine.guid.prefix, reader.guid, remote.guid, alive))
+            engine.recorder.liveliness(reader.guid, remote.guid, alive=alive)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .. import trace as tracing
 from ..behavior.defrag import Defragmenter
 from ..behavior.stateful_reader import RemoteWriter
 from ..discovery.matching import MatchRefusal, RefusalKind, judge
@@ -179,7 +178,7 @@ class Matchmaker:
         participant = engine.participants[data.guid[:12]]
         transmissions = writer.behavior.matched_reader_add(data, participant.user_traffic(data.unicast), now)
         writer.receivers = tuple(writer.behavior.readers)
-        self._note_matched(writer.guid, data.guid, data.topic_name, now)
+        self._note_matched(writer.guid, data.guid, data.topic_name)
         engine.status(writer.guid, writer.match_changed(data.guid, 1))
         engine.writer_answers(writer, transmissions)
 
@@ -187,7 +186,7 @@ class Matchmaker:
         engine = self._engine
         participant = engine.participants[data.guid[:12]]
         self.attach_writer(reader, data, participant, participant.user_traffic(data.unicast), now)
-        self._note_matched(reader.guid, data.guid, data.topic_name, now)
+        self._note_matched(reader.guid, data.guid, data.topic_name)
         engine.status(reader.guid, reader.match_changed(data.guid, 1))
         engine.status(reader.guid, reader.liveliness_changed(data.guid, alive=1, not_alive=0))
         engine.liveliness.remote_writer_matched(data, now)
@@ -223,7 +222,7 @@ class Matchmaker:
         writer_proxy = reader.behavior.matched_writer_add(writer.data, (), now, is_local=True)
         writer_proxy.reorder.next_sn = reader_proxy.history_sn + 1
         writer_proxy.last_seq = reader_proxy.history_sn
-        self._note_matched(writer.guid, reader.guid, writer.data.topic_name, now)
+        self._note_matched(writer.guid, reader.guid, writer.data.topic_name)
         engine.status(writer.guid, writer.match_changed(reader.guid, 1))
         engine.status(reader.guid, reader.match_changed(writer.guid, 1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=1, not_alive=0))
@@ -237,7 +236,7 @@ class Matchmaker:
         writer.behavior.matched_reader_remove(guid, now)
         writer.receivers = tuple(writer.behavior.readers)
         self._engine.hooks.unmatch(writer.guid, guid)
-        self._note_unmatched(writer.guid, guid, writer.data.topic_name, reason, now)
+        self._engine.recorder.unmatched(writer.guid, guid, writer.data.topic_name, reason)
         self._engine.status(writer.guid, writer.match_changed(guid, -1))
         self._engine.writer_answers(writer, writer.behavior.unsent_changes(now))
 
@@ -246,7 +245,7 @@ class Matchmaker:
         proxy = reader.behavior.writers.get(guid)
         self.detach_writer(reader, guid, now)
         engine.hooks.unmatch(reader.guid, guid)
-        self._note_unmatched(reader.guid, guid, reader.data.topic_name, reason, now)
+        self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_lost(guid, now)
         engine.status(reader.guid, reader.match_changed(guid, -1))
@@ -273,7 +272,7 @@ class Matchmaker:
         engine = self._engine
         writer.behavior.matched_reader_remove(reader.guid, now)
         reader.behavior.matched_writer_remove(writer.guid, now)
-        self._note_unmatched(writer.guid, reader.guid, writer.data.topic_name, reason, now)
+        self._engine.recorder.unmatched(writer.guid, reader.guid, writer.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_lost(writer.guid, now)
         engine.status(writer.guid, writer.match_changed(reader.guid, -1))
@@ -299,47 +298,12 @@ class Matchmaker:
         if self.refusals.get((local, remote)) == refusal:
             return False
         self.refusals[(local, remote)] = refusal
-        trace = self._engine.trace
-        if trace is not None:
-            prefix = self._engine.guid.prefix
-            for reason in refusal.incompatibilities:
-                trace(
-                    tracing.events.Incompatible(
-                        self._engine.now,
-                        prefix,
-                        local,
-                        remote,
-                        topic_name,
-                        reason.policy,
-                        reason.offered,
-                        reason.requested,
-                    )
-                )
-            if not refusal.incompatibilities:
-                trace(
-                    tracing.events.Incompatible(
-                        self._engine.now,
-                        prefix,
-                        local,
-                        remote,
-                        topic_name,
-                        refusal.kind,
-                        refusal.offered,
-                        refusal.requested,
-                    )
-                )
+        self._engine.recorder.refused(local, remote, topic_name, refusal)
         return True
 
-    def _note_matched(self, local: Guid, remote: Guid, topic_name: str, now: float) -> None:
+    def _note_matched(self, local: Guid, remote: Guid, topic_name: str) -> None:
         self._drop(local, remote)
-        if self._engine.trace is not None:
-            self._engine.trace(tracing.events.Matched(now, self._engine.guid.prefix, local, remote, topic_name))
-
-    def _note_unmatched(self, local: Guid, remote: Guid, topic_name: str, reason: LossReason, now: float) -> None:
-        if self._engine.trace is not None:
-            self._engine.trace(
-                tracing.events.Unmatched(now, self._engine.guid.prefix, local, remote, topic_name, reason)
-            )
+        self._engine.recorder.matched(local, remote, topic_name)
 
     def _drop(self, local: Guid, remote: Guid) -> None:
         self.refusals.pop((local, remote), None)

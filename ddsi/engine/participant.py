@@ -14,13 +14,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from random import Random
 from typing import TYPE_CHECKING, TypeVar
 
-from .. import trace as tracing
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
@@ -44,39 +42,29 @@ from ..structure.status import SecurityRefused, Status
 from ..structure.time import ticks_from_nanoseconds
 from ..structure.vendor import PROTOCOL_VERSION
 from ..trace.reasons import DropReason, LossReason, SampleLossReason
+from .alarms import Alarms
 from .discovery_agent import DiscoveryAgent
-from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
+from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
 from .inbound import Inbound
 from .liveliness import Liveliness
 from .local_endpoints import KeyCodec, LocalReader, LocalWriter
 from .matchmaker import Matchmaker
 from .outbound import Outbound, fragment_octets_for
-from .timers import Timers
+from .recorder import Recorder
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
 
-__all__ = ["Participant", "ParticipantSetup", "Timer"]
+__all__ = ["Participant", "ParticipantSetup"]
 
 _Endpoint = TypeVar("_Endpoint")
+_LOSS_TEXT = {
+    SampleLossReason.BEST_EFFORT: "skipped by a best-effort stream",
+    SampleLossReason.NOT_AVAILABLE: "the writer no longer has it",
+}
 _FLUSH_AFTER_S = 0.001
 _LINGER_S = 1.0
 _REORDER_MAX_OCTETS = 64 << 20
-
-
-class Timer(Enum):
-    """What the engine waits for.  Keys of the timer table are (Timer, Guid...)."""
-
-    SPDP = "announce ourselves"
-    LEASE = "a remote participant has been silent for its lease"
-    WRITER = "a writer's heartbeat, pace or lifespan"
-    ACKNACK = "a reader's answer to one writer"
-    ASSERTION = "assert automatic liveliness"
-    WRITER_LIVELINESS = "a local manual writer was not asserted"
-    REMOTE_LIVELINESS = "a remote writer's liveliness lease"
-    FLUSH = "queued samples must leave"
-    LINGER = "a closed writer has waited long enough for acknowledgment"
-    SECURITY = "the hooks asked to be called"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +122,6 @@ class Participant:
         self.domain_id = setup.domain_id
         self.hooks = hooks
         self.random = random
-        self.trace = trace
         self.now = 0.0
         candidate = LocalParticipant(
             guid=Guid.of(setup.guid_prefix, EntityId.PARTICIPANT),
@@ -144,7 +131,8 @@ class Participant:
         )
         self.guid = hooks.local_participant(candidate)
         self._wall_clock = wall_clock
-        self._timers = Timers()
+        self.recorder = Recorder(self, trace)
+        self.alarms = Alarms(self)
         self._effects: list[Effect] = []
         self._waiting: list[tuple[EntityId, CacheChange]] = []
         self._flush_armed = False
@@ -174,8 +162,7 @@ class Participant:
     def start(self, now: float) -> None:
         """Begin to announce; the first input."""
         self.now = now
-        if self.trace is not None:
-            self.trace(tracing.events.ParticipantCreated(now, self.guid.prefix, self.domain_id, self.config.vendor_id))
+        self.recorder.created()
         self.discovery.start(now)
 
     def receive_datagram(self, octets: Octets, source: Locator, now: float) -> None:
@@ -183,8 +170,8 @@ class Participant:
         if self._is_closed:
             return
         self.now = now
-        if self.trace is not None:
-            self.trace(tracing.events.MessageReceived(now, self.guid.prefix, source, bytes(octets)))
+        if self.recorder.is_on:
+            self.recorder.received(source, octets)
         self.inbound.receive(octets, source, now)
         if self._waiting:
             self._process_builtin_changes(now)
@@ -192,14 +179,14 @@ class Participant:
     def handle_timeout(self, now: float) -> None:
         """Run every timer that is due."""
         self.now = now
-        while (key := self._timers.pop_due(now)) is not None and not self._is_closed:
-            self._fire(key, now)
+        if not self._is_closed:
+            self.alarms.run_due(now)
         if self._waiting:
             self._process_builtin_changes(now)
 
     def next_deadline(self) -> float:
         """When :meth:`handle_timeout` is wanted at the latest, in engine seconds; ``math.inf`` for never."""
-        return self._timers.next_deadline()
+        return self.alarms.next_deadline()
 
     def drain_effects(self) -> list[Effect]:
         """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
@@ -227,18 +214,11 @@ class Participant:
         if not self.outbound.is_idle:
             sent = len(self._effects)
             self.outbound.flush()
-            if self.trace is not None:
-                self._trace_sent(sent)
+            if self.recorder.is_on:
+                self.recorder.sent(self._effects[sent:])
         if self._flush_armed:
             self._flush_armed = False
-            self._timers.cancel(Timer.FLUSH)
-
-    def _trace_sent(self, start: int) -> None:
-        assert self.trace is not None
-        for effect in self._effects[start:]:
-            if isinstance(effect, SendDatagram):
-                octets = b"".join(effect.parts)
-                self.trace(tracing.events.MessageSent(self.now, self.guid.prefix, effect.destinations, octets))
+            self.alarms.flush(math.inf)
 
     # --- endpoints ---------------------------------------------------------------------------------------
 
@@ -265,7 +245,7 @@ class Participant:
         writer = self._add_writer(data, filters=filters)
         writer.protection = protection
         self._writers_by_topic.setdefault(topic_name, {})[writer.guid] = writer
-        self._trace_created(data, now)
+        self.recorder.endpoint_created(data)
         self.discovery.announce_writer(data, now)
         self.liveliness.writer_added(writer, now)
         self.matchmaker.writer_appeared(writer, now)
@@ -301,9 +281,10 @@ class Participant:
             on_rejected=lambda reason: self._sample_rejected(guid, reason),
         )
         reader = self._add_reader(data, history, keys)
+        reader.behavior.history = self.recorder.delivering(guid, history)
         reader.protection = protection
         self._readers_by_topic.setdefault(topic_name, {})[guid] = reader
-        self._trace_created(data, now)
+        self.recorder.endpoint_created(data)
         self.discovery.announce_reader(data, now)
         self.matchmaker.reader_appeared(reader, now)
         return reader
@@ -316,7 +297,7 @@ class Participant:
         self.closing.add(writer.guid)
         behavior = writer.behavior
         if behavior.is_reliable and behavior.readers and behavior.min_acked_sn() < behavior.cache.last_sn:
-            self._timers.set((Timer.LINGER, writer.guid), now + _LINGER_S)
+            self.alarms.linger(writer.guid, now + _LINGER_S)
             self.writer_answers(writer, behavior.request_acknowledgment())
         else:
             self._finish_writer(writer, now)
@@ -328,10 +309,13 @@ class Participant:
         self.closing.discard(writer.guid)
         del self.local_writers[writer.guid]
         _remove_from_topic(self._writers_by_topic, writer.data.topic_name, writer.guid)
-        for timer in (Timer.WRITER, Timer.LINGER, Timer.WRITER_LIVELINESS):
-            self._timers.cancel((timer, writer.guid))
-        if self.trace is not None:
-            self.trace(tracing.events.EndpointClosed(now, self.guid.prefix, writer.guid))
+        self.alarms.forget_writer(writer.guid)
+        self.recorder.endpoint_closed(writer.guid)
+
+    def linger_ended(self, writer: LocalWriter, now: float) -> None:
+        """All was acknowledged, or a closed writer waited long enough."""
+        if writer.guid in self.closing:
+            self._finish_writer(writer, now)
 
     def delete_reader(self, reader: LocalReader, now: float) -> None:
         self.now = now
@@ -342,8 +326,7 @@ class Participant:
         self.discovery.announce_reader_gone(reader.guid, now)
         del self.local_readers[reader.guid]
         _remove_from_topic(self._readers_by_topic, reader.data.topic_name, reader.guid)
-        if self.trace is not None:
-            self.trace(tracing.events.EndpointClosed(now, self.guid.prefix, reader.guid))
+        self.recorder.endpoint_closed(reader.guid)
 
     def close(self, now: float) -> None:
         """Goodbye: endpoints first, then the participant.  The effects that this leaves must still be drained."""
@@ -357,8 +340,7 @@ class Participant:
         self.outbound.flush()
         self.discovery.say_goodbye()
         self._is_closed = True
-        if self.trace is not None:
-            self.trace(tracing.events.ParticipantClosed(now, self.guid.prefix))
+        self.recorder.closed()
 
     def user_writers(self, topic_name: str | None = None) -> list[LocalWriter]:
         """The application's writers, of all topics or of one."""
@@ -403,12 +385,8 @@ class Participant:
             destination=destination,
             related=related,
         )
-        if self.trace is not None:
-            self.trace(
-                tracing.events.ChangeWritten(
-                    now, self.guid.prefix, writer.guid, change.sequence_number, kind, len(payload)
-                )
-            )
+        if self.recorder.is_on:
+            self.recorder.written(change)
         if behavior.local_readers:
             for guid in list(behavior.local_readers):
                 self.deliver_locally(writer, self.local_readers[guid], change, now)
@@ -420,10 +398,10 @@ class Participant:
             self.liveliness.written(writer, now)
         due = behavior.next_deadline()
         if due != writer.timer_due:
-            self._set_writer_timer(writer, due)
+            self.alarms.writer(writer, due)
         if not self._flush_armed and not self.outbound.is_idle:
             self._flush_armed = True
-            self._timers.set(Timer.FLUSH, now + _FLUSH_AFTER_S)
+            self.alarms.flush(now + _FLUSH_AFTER_S)
         return change
 
     def write_builtin(
@@ -465,21 +443,21 @@ class Participant:
         """A writer decided to send these; its timer may have moved and somebody may wait for its progress."""
         if transmissions:
             self.outbound.transmit(writer, transmissions)
-        self._set_writer_timer(writer, writer.behavior.next_deadline())
+        self.alarms.writer(writer, writer.behavior.next_deadline())
         self.writer_progressed(writer)
 
     def writer_progressed(self, writer: LocalWriter) -> None:
         if writer.wants_acknowledgment:
             self._effects.append(WriterProgress(writer.guid))
         if writer.guid in self.closing and writer.behavior.min_acked_sn() >= writer.behavior.cache.last_sn:
-            self._timers.set((Timer.LINGER, writer.guid), self.now)
+            self.alarms.linger(writer.guid, self.now)
 
     def proxy_touched(self, reader: StatefulReader, proxy: WriterProxy) -> None:
         """A reader's schedule towards one writer moved."""
-        self._timers.set((Timer.ACKNACK, reader.guid, proxy.guid), proxy.schedule.due)
+        self.alarms.answer(reader.guid, proxy.guid, proxy.schedule.due)
 
     def forget_proxy(self, reader: Guid, writer: Guid) -> None:
-        self._timers.cancel((Timer.ACKNACK, reader, writer))
+        self.alarms.answer(reader, writer, math.inf)
 
     def fragments_announced(self, reader: LocalReader, proxy: WriterProxy, number: int, last_fragment: int) -> None:
         """HEARTBEAT_FRAG: ask for fragments that should be here, if any of that sample is."""
@@ -508,10 +486,7 @@ class Participant:
 
     def status(self, entity: Guid, status: Status) -> None:
         self._effects.append(StatusChanged(entity, status))
-        if self.trace is not None:
-            self.trace(
-                tracing.events.StatusChanged(self.now, self.guid.prefix, entity, type(status).__name__, repr(status))
-            )
+        self.recorder.status(entity, status)
 
     def discovery_changed(self) -> None:
         if not self._effects or not isinstance(self._effects[-1], DiscoveryChanged):
@@ -520,34 +495,24 @@ class Participant:
     def dropped(self, reason: DropReason, source: Locator | None, detail: str = "") -> None:
         """Count something that was not acted upon."""
         self.drops[reason] += 1
-        if self.trace is not None:
-            self.trace(tracing.events.Dropped(self.now, self.guid.prefix, reason, source, detail))
+        if self.recorder.is_on:
+            self.recorder.dropped(reason, source, detail)
 
     def dropped_discovery(self, change: CacheChange, detail: str) -> None:
         self.dropped(DropReason.MALFORMED_DISCOVERY_DATA, None, f"{change.writer_guid}: {detail}")
 
-    def samples_lost(self, reader: LocalReader, proxy: WriterProxy, count: int, first: int, reason: str) -> None:
-        self.status(reader.guid, reader.samples_lost(count, reason))
-        if self.trace is not None:
-            why = SampleLossReason.BEST_EFFORT if reason == "best effort" else SampleLossReason.NOT_AVAILABLE
-            self.trace(
-                tracing.events.SampleLost(
-                    self.now, self.guid.prefix, reader.guid, proxy.guid, first, first + count - 1, why
-                )
-            )
+    def samples_lost(
+        self, reader: LocalReader, proxy: WriterProxy, count: int, first: int, why: SampleLossReason
+    ) -> None:
+        """Numbers that will never be delivered to this reader."""
+        self.status(reader.guid, reader.samples_lost(count, _LOSS_TEXT[why]))
+        self.recorder.samples_lost(reader.guid, proxy.guid, first, first + count - 1, why)
 
     def sample_malformed(self, reader: LocalReader, change: CacheChange, detail: str) -> None:
         """Octets that are no sample of the topic's type: lost, with the reason."""
-        reason = f"sample {change.sequence_number} of {change.writer_guid} does not decode: {detail}"
-        self.status(reader.guid, reader.samples_lost(1, reason))
-        if self.trace is not None:
-            number = change.sequence_number
-            why = SampleLossReason.MALFORMED_SAMPLE
-            self.trace(
-                tracing.events.SampleLost(
-                    self.now, self.guid.prefix, reader.guid, change.writer_guid, number, number, why, detail
-                )
-            )
+        number, writer = change.sequence_number, change.writer_guid
+        self.status(reader.guid, reader.samples_lost(1, f"sample {number} of {writer} does not decode: {detail}"))
+        self.recorder.samples_lost(reader.guid, writer, number, number, SampleLossReason.MALFORMED_SAMPLE, detail)
 
     def _sample_rejected(self, guid: Guid, reason: str) -> None:
         self.status(guid, self.local_readers[guid].sample_rejected(reason))
@@ -555,72 +520,15 @@ class Participant:
     def send_spdp(self, submessage: bytes, destinations: tuple[Locator, ...]) -> None:
         sent = len(self._effects)
         self.outbound.send_plain((submessage,), destinations)
-        if self.trace is not None:
-            self._trace_sent(sent)
+        if self.recorder.is_on:
+            self.recorder.sent(self._effects[sent:])
 
     def wall_ticks(self) -> int:
         """The wall clock in ticks."""
         return ticks_from_nanoseconds(self._wall_clock())
 
-    # --- timers ------------------------------------------------------------------------------------------
-
-    def _set_writer_timer(self, writer: LocalWriter, deadline: float) -> None:
-        writer.timer_due = deadline
-        self._timers.set((Timer.WRITER, writer.guid), deadline)
-
-    def set_spdp_timer(self, deadline: float) -> None:
-        self._timers.set(Timer.SPDP, deadline)
-
-    def set_lease_timer(self, participant: ParticipantProxy) -> None:
-        self._timers.set((Timer.LEASE, participant.prefix), participant.lease_due)
-
-    def cancel_lease_timer(self, participant: ParticipantProxy) -> None:
-        self._timers.cancel((Timer.LEASE, participant.prefix))
-
-    def set_assertion_timer(self, now: float) -> None:
-        self._timers.set(Timer.ASSERTION, now)
-
-    def set_writer_liveliness_timer(self, writer: LocalWriter) -> None:
-        self._timers.set((Timer.WRITER_LIVELINESS, writer.guid), writer.assertion_due)
-
-    def set_remote_liveliness_timer(self, guid: Guid, deadline: float) -> None:
-        self._timers.set((Timer.REMOTE_LIVELINESS, guid), deadline)
-
-    def _fire(self, key: Hashable, now: float) -> None:
-        timer, *rest = key if isinstance(key, tuple) else (key,)
-        if self.trace is not None:
-            self.trace(tracing.events.TimerFired(now, self.guid.prefix, timer.name.lower(), now))
-        match timer:
-            case Timer.SPDP:
-                self.discovery.announce_due(now)
-            case Timer.LEASE:
-                self.discovery.lease_due(rest[0], now)
-            case Timer.WRITER:
-                writer = self.local_writers.get(rest[0])
-                if writer is not None:
-                    writer.timer_due = math.inf
-                    self.writer_answers(writer, writer.behavior.handle_timeout(now))
-            case Timer.ACKNACK:
-                self._answer_writer(rest[0], rest[1], now)
-            case Timer.ASSERTION:
-                self.liveliness.assert_automatic(now)
-                self._timers.set(Timer.ASSERTION, now + self.liveliness.assertion_period())
-            case Timer.WRITER_LIVELINESS:
-                writer = self.local_writers.get(rest[0])
-                if writer is not None:
-                    self.liveliness.writer_due(writer, now)
-            case Timer.REMOTE_LIVELINESS:
-                self.liveliness.remote_writer_due(rest[0], now)
-            case Timer.FLUSH:
-                self._flush_armed = False
-                self.flush()
-            case Timer.LINGER:
-                if rest[0] in self.closing:
-                    self._finish_writer(self.local_writers[rest[0]], now)
-            case Timer.SECURITY:
-                self.hooks.handle_timeout(now)
-
-    def _answer_writer(self, reader_guid: Guid, writer_guid: Guid, now: float) -> None:
+    def answer_writer(self, reader_guid: Guid, writer_guid: Guid, now: float) -> None:
+        """A reader's schedule towards one writer is due."""
         reader = self.local_readers.get(reader_guid)
         proxy = reader.behavior.writers.get(writer_guid) if reader is not None else None
         if reader is None or proxy is None:
@@ -668,7 +576,7 @@ class Participant:
                     )
                 case Decided():
                     self._decided(effect, self.now)
-        self._timers.set(Timer.SECURITY, self.hooks.next_deadline())
+        self.alarms.security(self.hooks.next_deadline())
 
     def _decided(self, effect: Decided, now: float) -> None:
         if effect.local != self.guid:
@@ -717,12 +625,6 @@ class Participant:
         key = self._next_entity_key
         self._next_entity_key += 1
         return Guid.of(self.guid.prefix, EntityId.user(key, kind))
-
-    def _trace_created(self, data: DiscoveredWriterData | DiscoveredReaderData, now: float) -> None:
-        if self.trace is not None:
-            self.trace(
-                tracing.events.EndpointCreated(now, self.guid.prefix, data.guid, data.topic_name, data.type_name)
-            )
 
 
 def _remove_from_topic(table: dict[str, dict[Guid, _Endpoint]], topic_name: str, guid: Guid) -> None:
