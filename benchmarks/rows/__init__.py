@@ -1,0 +1,16 @@
+"""The benchmarks by theme, in the order of the table.  A new one stands in the file of its theme."""
+
+from benchmarks.benchmark import Benchmark
+
+from . import codec, floors, footprint, matching, round_trip, throughput
+
+__all__ = ["BENCHMARKS"]
+
+BENCHMARKS: tuple[Benchmark, ...] = (
+    *codec.BENCHMARKS,
+    *throughput.BENCHMARKS,
+    *round_trip.BENCHMARKS,
+    *matching.BENCHMARKS,
+    *footprint.BENCHMARKS,
+    *floors.BENCHMARKS,
+)

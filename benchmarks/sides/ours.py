@@ -1,0 +1,191 @@
+"""Ours: the roles as an application of this stack would play them, through its public face alone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Annotated
+
+import trio
+
+import ddsi
+from ddsi import idl
+
+from .memory import resident_mib
+from .protocol import PAYLOAD_BYTE, play, say_ready, summarise_round_trips
+
+QOS = ddsi.Qos(reliability=ddsi.Reliable(max_blocking_time=30), history=ddsi.KeepAll())
+_WARM_UP = 100
+_SETTLE_S = 0.2
+
+
+@idl.struct(typename="ShapeType", extensibility=idl.FINAL)
+class ShapeType:
+    color: Annotated[str, idl.key, idl.bound(128)]
+    x: idl.int32
+    y: idl.int32
+    shapesize: idl.int32
+
+
+@idl.struct(typename="Octets", extensibility=idl.FINAL)
+class Octets:
+    x: idl.int32
+    octets: idl.sequence[idl.uint8]
+
+
+Sample = ShapeType | Octets
+
+
+def kind_of(octets: int) -> type[Sample]:
+    return Octets if octets else ShapeType
+
+
+def maker_of(octets: int) -> Callable[[int], Sample]:
+    """Makes the sample of a number; ``octets`` 0 stands for a ShapeType."""
+    if octets:
+        payload = PAYLOAD_BYTE * octets
+        return lambda number: Octets(number, payload)
+    return lambda number: ShapeType("BLUE", number, 20, 30)
+
+
+# --- codec -----------------------------------------------------------------------------------------------
+
+
+def serialise(octets: int, count: int) -> dict[str, float]:
+    sample = maker_of(octets)(7)
+    ddsi.serialize(sample, representation=ddsi.XCDR1)
+    start = time.perf_counter()
+    for _ in range(count):
+        ddsi.serialize(sample, representation=ddsi.XCDR1)
+    return {"us": (time.perf_counter() - start) / count * 1e6}
+
+
+def deserialise(octets: int, count: int) -> dict[str, float]:
+    kind = kind_of(octets)
+    data = ddsi.serialize(maker_of(octets)(7), representation=ddsi.XCDR1)
+    ddsi.deserialize(kind, data)
+    start = time.perf_counter()
+    for _ in range(count):
+        ddsi.deserialize(kind, data)
+    return {"us": (time.perf_counter() - start) / count * 1e6}
+
+
+# --- throughput ------------------------------------------------------------------------------------------
+
+
+async def receive(domain: int, octets: int, count: int) -> dict[str, float]:
+    async with ddsi.DomainParticipant(domain) as participant:
+        reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Throughput", kind_of(octets)), QOS)
+        say_ready()
+        received = 0
+        start = processor = 0.0
+        async for sample in reader:
+            if not received:
+                start, processor = time.perf_counter(), time.process_time()
+            received += 1
+            if sample.data.x == count - 1:
+                break
+        seconds = time.perf_counter() - start
+        processor = time.process_time() - processor
+        if received != count:
+            raise RuntimeError(f"received {received} samples of {count}")
+        return {"per_second": (count - 1) / seconds, "processor_us": processor / count * 1e6}
+
+
+async def send(domain: int, octets: int, count: int) -> dict[str, float]:
+    make = maker_of(octets)
+    async with ddsi.DomainParticipant(domain) as participant:
+        topic: ddsi.Topic[Sample] = ddsi.Topic(participant, "Throughput", kind_of(octets))
+        writer = ddsi.DataWriter(participant, topic, QOS)
+        await writer.wait_for_matched()
+        await trio.sleep(_SETTLE_S)
+        processor = time.process_time()
+        for number in range(count):
+            await writer.write(make(number))
+        await writer.wait_for_acknowledgments(30)
+        return {"processor_us": (time.process_time() - processor) / count * 1e6}
+
+
+# --- round trip ------------------------------------------------------------------------------------------
+
+
+async def echo(domain: int, count: int) -> None:
+    async with ddsi.DomainParticipant(domain) as participant:
+        reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Ping", ShapeType), QOS)
+        writer = ddsi.DataWriter(participant, ddsi.Topic(participant, "Pong", ShapeType), QOS)
+        say_ready()
+        async for sample in reader:
+            await writer.write(sample.data)
+
+
+async def ping(domain: int, count: int) -> dict[str, float]:
+    async with ddsi.DomainParticipant(domain) as participant:
+        writer = ddsi.DataWriter(participant, ddsi.Topic(participant, "Ping", ShapeType), QOS)
+        reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Pong", ShapeType), QOS)
+        await writer.wait_for_matched()
+        await reader.wait_for_matched()
+        await trio.sleep(_SETTLE_S)
+        seconds: list[float] = []
+        processor = 0.0
+        for number in range(_WARM_UP + count):
+            if number == _WARM_UP:
+                processor = time.process_time()
+            start = time.perf_counter()
+            await writer.write(ShapeType("BLUE", number, 20, 30))
+            sample = await anext(reader)
+            seconds.append(time.perf_counter() - start)
+            if sample.data.x != number:
+                raise RuntimeError(f"sent {number}, and {sample.data.x} came back")
+        return summarise_round_trips(seconds[_WARM_UP:], time.process_time() - processor)
+
+
+# --- matching, footprint ---------------------------------------------------------------------------------
+
+
+async def await_company(domain: int) -> None:
+    async with ddsi.DomainParticipant(domain) as participant:
+        ddsi.DataReader(participant, ddsi.Topic(participant, "There", ShapeType), QOS)
+        ddsi.DataWriter(participant, ddsi.Topic(participant, "Back", ShapeType), QOS)
+        await trio.sleep(_SETTLE_S)
+        say_ready()
+        await trio.sleep_forever()
+
+
+async def join(domain: int) -> dict[str, float]:
+    start = time.perf_counter()
+    async with ddsi.DomainParticipant(domain) as participant:
+        writer = ddsi.DataWriter(participant, ddsi.Topic(participant, "There", ShapeType), QOS)
+        reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Back", ShapeType), QOS)
+        await writer.wait_for_matched()
+        await reader.wait_for_matched()
+        return {"ms": (time.perf_counter() - start) * 1e3}
+
+
+async def idle(domain: int) -> dict[str, float]:
+    async with ddsi.DomainParticipant(domain):
+        await trio.sleep(1)
+        return {"mib": resident_mib()}
+
+
+def _run(role: Callable[..., Awaitable[dict[str, float] | None]]) -> Callable[..., dict[str, float] | None]:
+    def run(**options: object) -> dict[str, float] | None:
+        return trio.run(partial(role, **options))
+
+    return run
+
+
+if __name__ == "__main__":
+    play(
+        {
+            "serialise": serialise,
+            "deserialise": deserialise,
+            "receive": _run(receive),
+            "send": _run(send),
+            "echo": _run(echo),
+            "ping": _run(ping),
+            "await_company": _run(await_company),
+            "join": _run(join),
+            "idle": _run(idle),
+        }
+    )
