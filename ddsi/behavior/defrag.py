@@ -72,14 +72,14 @@ class PartialSample:
 class Defragmenter:
     """The unfinished samples of one remote writer; ``max_octets`` and ``max_samples`` bound them."""
 
-    __slots__ = ("_keeps_lowest", "_max_octets", "_max_samples", "_octets", "_partial", "dropped")
+    __slots__ = ("_max_octets", "_max_samples", "_octets", "_partial", "dropped", "keeps_lowest")
 
     def __init__(self, *, max_octets: int, max_samples: int, keeps_lowest: bool) -> None:
         """``keeps_lowest``: when full, the highest number goes (a reliable writer will send it again, and the
         lowest is what everybody waits for); else the oldest goes (best effort: it will never be finished)."""
         self._max_octets = max_octets
         self._max_samples = max_samples
-        self._keeps_lowest = keeps_lowest
+        self.keeps_lowest = keeps_lowest
         self._octets = 0
         self._partial: dict[AssemblyKey, PartialSample] = {}
         self.dropped = 0
@@ -131,7 +131,7 @@ class Defragmenter:
         }
 
     def notice_number(self, sequence_number: int) -> None:
-        """Best effort: everything below a number that was delivered will never be wanted."""
+        """Everything below this number will never be wanted: it was delivered (best effort), or is settled."""
         for key in [key for key in self._partial if key[2] < sequence_number]:
             self._remove(key)
 
@@ -155,9 +155,9 @@ class Defragmenter:
         while self._partial and (
             len(self._partial) >= self._max_samples or self._octets + sample_size > self._max_octets
         ):
-            victim = max(self._partial, key=lambda held: held[2]) if self._keeps_lowest else next(iter(self._partial))
+            victim = max(self._partial, key=lambda held: held[2]) if self.keeps_lowest else next(iter(self._partial))
             self.dropped += 1
-            if self._keeps_lowest and victim[2] <= key[2]:
+            if self.keeps_lowest and victim[2] <= key[2]:
                 return None
             self._remove(victim)
         sample = self._partial[key] = PartialSample(sample_size, fragment_size)

@@ -48,6 +48,22 @@ class RemoteWriter:
         self.asserts_by_data = liveliness.KIND > 0 and liveliness.lease_duration < math.inf
         self.readers: list[tuple[StatefulReader, WriterProxy]] = []
 
+    def readers_changed(self) -> None:
+        """A reader was matched or unmatched: is anybody here who will ask for what is missing?"""
+        self.is_reliable = any(proxy.is_reliable for _, proxy in self.readers)
+        self.defragmenter.keeps_lowest = self.is_reliable
+
+    def forget_settled(self, delivered_sn: int = 0) -> None:
+        """Drop unfinished samples that nobody waits for: below a best-effort delivery, or passed by every reliable
+        reader.
+
+        They would never be finished, and as the lowest numbers they would keep the others out.
+        """
+        if self.is_reliable:
+            self.defragmenter.notice_number(min(proxy.next_sn for _, proxy in self.readers if proxy.is_reliable))
+        else:
+            self.defragmenter.notice_number(delivered_sn)
+
 
 class StatefulReader:
     """One local reader.  All its methods take the proxy they are about; nothing is looked up twice."""

@@ -73,6 +73,11 @@ class StatefulWriter:
         sent = f"sent {self.next_unsent_sn - 1} of {self.cache.last_sn}"
         return f"<StatefulWriter {self.guid} {sent}, {len(self.readers)} readers>"
 
+    @property
+    def in_flight_octets(self) -> int:
+        """What was sent and not yet acknowledged by the readers that still answer; the window bounds it."""
+        return self._in_flight_octets
+
     # --- the application's side --------------------------------------------------------------------------
 
     @property
@@ -466,7 +471,9 @@ class StatefulWriter:
         else:
             self.cache.acknowledged_up_to(self.min_acked_sn())
         self._drain_in_flight()
-        self.heartbeat.progress(now, complete=not self._lagging_readers())
+        # What was not sent yet is lacked by all: a local reader takes a change before it leaves for the others.
+        all_sent = self.next_unsent_sn > self.cache.last_sn
+        self.heartbeat.progress(now, complete=all_sent and not self._lagging_readers())
 
     def _drain_in_flight(self) -> None:
         acked = min(

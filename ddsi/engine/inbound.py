@@ -345,8 +345,8 @@ class Inbound:
                 )
         if remote.asserts_by_data:
             self._engine.liveliness.writer_asserted(remote.guid, now)
-        if not remote.is_reliable:
-            remote.defragmenter.notice_number(change.sequence_number)
+        if remote.defragmenter:
+            remote.forget_settled(change.sequence_number)
 
     def _from_unmatched(
         self,
@@ -457,6 +457,7 @@ class Inbound:
             if lost:
                 self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
             self._engine.proxy_touched(local.behavior, proxy)
+        self._forget_settled(incoming, heartbeat.writer_id)
         if heartbeat.liveliness and incoming.is_for_us:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
 
@@ -472,6 +473,13 @@ class Inbound:
         for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
             local.behavior.receive_gap(proxy, gap.gap_start, gap.gap_list, incoming.now)
             self._engine.proxy_touched(local.behavior, proxy)
+        self._forget_settled(incoming, gap.writer_id)
+
+    def _forget_settled(self, incoming: Incoming, writer_id: bytes) -> None:
+        """Numbers may have become irrelevant of which fragments are here."""
+        remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
+        if remote is not None and remote.defragmenter:
+            remote.forget_settled()
 
     # --- ACKNACK -----------------------------------------------------------------------------------------
 

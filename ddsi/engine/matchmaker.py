@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Matchmaker"]
 
-_MAX_UNFINISHED_RELIABLE = 256
-_MAX_UNFINISHED_BEST_EFFORT = 4
-
 
 class Matchmaker:
     """``refusals``: for each (local, remote) pair of one topic that does not match, the reason."""
@@ -205,15 +202,15 @@ class Matchmaker:
         engine = self._engine
         remote = engine.remote_writers.get(data.guid)
         if remote is None:
-            reliable = data.qos.is_reliable
             defragmenter = Defragmenter(
                 max_octets=engine.config.max_defrag_octets,
-                max_samples=_MAX_UNFINISHED_RELIABLE if reliable else _MAX_UNFINISHED_BEST_EFFORT,
-                keeps_lowest=reliable,
+                max_samples=engine.config.max_reorder_samples,
+                keeps_lowest=data.qos.is_reliable,
             )
             remote = engine.remote_writers[data.guid] = RemoteWriter(data, defragmenter, participant)
         proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=uses_filter)
         remote.readers.append((reader.behavior, proxy))
+        remote.readers_changed()
         engine.proxy_touched(reader.behavior, proxy)
 
     def _match_local(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
@@ -267,6 +264,8 @@ class Matchmaker:
         if not remote.readers:
             del engine.remote_writers[guid]
             engine.liveliness.remote_writer_gone(guid)
+        else:
+            remote.readers_changed()
 
     def _unmatch_local(self, writer: LocalWriter, reader: LocalReader, reason: LossReason, now: float) -> None:
         engine = self._engine
