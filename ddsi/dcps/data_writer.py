@@ -139,9 +139,9 @@ class DataWriter(Entity, Generic[T]):
         limit = self._endpoint_qos.reliability.max_blocking_time
         behavior = self._writer.behavior
         with trio.move_on_after(limit) if limit < math.inf else trio.CancelScope():
+            asked_at = -1
             while (reason := behavior.lacks_room(octets, key)) is not None:
-                self._pump.engine.request_acknowledgment(self._writer, self._pump.now())
-                self._pump.settle()
+                asked_at = self._ask_for_acknowledgment(asked_at)
                 await self._wait_for_progress()
                 self._check_open()
             return self._pump.now()
@@ -149,6 +149,16 @@ class DataWriter(Entity, Generic[T]):
             f"writer of {self._topic.name!r} found no room within max_blocking_time={limit} s: {reason}; "
             "its readers are too slow, or one of them does not answer"
         )
+
+    def _ask_for_acknowledgment(self, asked_at: int) -> int:
+        """Ask the readers what they have, but not the same twice: a reader that is full answers and gets no further,
+        and asking at each answer would turn waiting into a storm.  Its writer's heartbeats go on asking, at their pace.
+        """
+        acked_sn = self._writer.behavior.min_acked_sn()
+        if acked_sn != asked_at:
+            self._pump.engine.request_acknowledgment(self._writer, self._pump.now())
+        self._pump.settle()
+        return acked_sn
 
     async def _wait_for_progress(self) -> None:
         self._writer.wants_acknowledgment += 1
@@ -170,9 +180,9 @@ class DataWriter(Entity, Generic[T]):
         last_sn = behavior.cache.last_sn
         with trio.move_on_after(timeout) if timeout is not None else trio.CancelScope():
             self._pump.settle()
+            asked_at = -1
             while behavior.min_acked_sn() < last_sn:
-                self._pump.engine.request_acknowledgment(self._writer, self._pump.now())
-                self._pump.settle()
+                asked_at = self._ask_for_acknowledgment(asked_at)
                 await self._wait_for_progress()
                 self._check_open()
             return
