@@ -109,7 +109,7 @@ class SecurityHooks(Protocol):
     # --- lifecycle ---------------------------------------------------------------------------------------
 
     def local_participant(self, candidate: LocalParticipant) -> Guid:
-        """The Guid to use, adjusted to the identity (DDS-Security 1.1 §8.3.2.11.1, validate_local_identity).
+        """The Guid to use, adjusted to the identity (DDS-Security 1.1 §8.3.2.11.2, validate_local_identity).
 
         Called once, before anything is sent.  Raises NotAllowedBySecurity or ConfigurationError.
         """
@@ -120,11 +120,11 @@ class SecurityHooks(Protocol):
         ...
 
     def local_writer(self, data: DiscoveredWriterData) -> ProtectedEndpoint:
-        """A writer is to be created (§8.4.2.9.3, check_create_datawriter).  Raises NotAllowedBySecurity."""
+        """A writer is to be created (§8.4.2.9.4, check_create_datawriter).  Raises NotAllowedBySecurity."""
         ...
 
     def local_reader(self, data: DiscoveredReaderData) -> ProtectedEndpoint:
-        """A reader is to be created (§8.4.2.9.4, check_create_datareader).  Raises NotAllowedBySecurity."""
+        """A reader is to be created (§8.4.2.9.5, check_create_datareader).  Raises NotAllowedBySecurity."""
         ...
 
     def local_endpoint_changed(self, data: DiscoveredWriterData | DiscoveredReaderData) -> ProtectedEndpoint:
@@ -134,7 +134,7 @@ class SecurityHooks(Protocol):
     def local_endpoint_deleted(self, guid: Guid) -> None: ...
 
     def remote_participant(self, data: DiscoveredParticipantData, now: float) -> Admission:
-        """A participant was discovered (§8.3.2.11.2, validate_remote_identity).
+        """A participant was discovered (§8.3.2.11.3, validate_remote_identity).
 
         PENDING while it is authenticated: its endpoints are not matched, and only the builtin endpoints that
         authentication itself needs are, until a :class:`Decided` comes.
@@ -146,7 +146,7 @@ class SecurityHooks(Protocol):
     def remote_participant_lost(self, guid: Guid) -> None: ...
 
     def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
-        """May the local endpoint match the remote one (§8.4.2.9.15-18, §8.5.1.7.3-6)?  PENDING: keys are under way."""
+        """May the local endpoint match the remote one (§8.4.2.9.10-11, §8.5.1.7.3-6)?  PENDING: keys are under way."""
         ...
 
     def unmatch(self, local: Guid, remote: Guid) -> None: ...

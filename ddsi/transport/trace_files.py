@@ -8,8 +8,9 @@ from typing import TextIO
 
 from ..config import Config
 from ..structure.errors import ConfigurationError
+from ..trace.event import Category
 from ..trace.pcapng import PcapngSink
-from ..trace.sink import JsonLinesSink, TraceSink, tee
+from ..trace.sink import JsonLinesSink, TraceSink, only, tee
 
 __all__ = ["open_trace"]
 
@@ -22,7 +23,8 @@ def open_trace(config: Config, files: ExitStack, *, epoch_offset: float) -> Trac
     sinks: list[TraceSink] = []
     try:
         if config.trace_file:
-            sinks.append(JsonLinesSink(_text_stream(config, files), epoch_offset=epoch_offset))
+            lines = JsonLinesSink(_text_stream(config, files), epoch_offset=epoch_offset)
+            sinks.append(only(lines, categories=_categories(config.trace_level)))
         if config.pcap_file:
             stream = files.enter_context(open(config.pcap_file, "wb"))  # noqa: SIM115 - closed by the stack
             sinks.append(PcapngSink(stream, epoch_offset=epoch_offset))
@@ -31,6 +33,27 @@ def open_trace(config: Config, files: ExitStack, *, epoch_offset: float) -> Trac
     if not sinks:
         return None
     return sinks[0] if len(sinks) == 1 else tee(*sinks)
+
+
+_LEVELS: tuple[tuple[str, tuple[Category, ...]], ...] = (
+    ("severe", (Category.REMARK, Category.SECURITY)),
+    ("warning", (Category.DROP,)),
+    ("info", (Category.STATUS, Category.MATCHING)),
+    ("config", (Category.DISCOVERY,)),
+    ("fine", (Category.DATA,)),
+    ("finer", (Category.TIMER, Category.LINK)),
+    ("finest", (Category.MESSAGE,)),
+)
+"""Each level of ``Tracing/Verbosity`` adds these categories to those of the levels before it."""
+
+
+def _categories(level: str) -> set[Category]:
+    categories: set[Category] = set()
+    for name, added in _LEVELS:
+        categories.update(added)
+        if name == level:
+            break
+    return categories
 
 
 def _text_stream(config: Config, files: ExitStack) -> TextIO:
