@@ -135,11 +135,7 @@ class StatefulReader:
         """
         number = change.sequence_number
         reorder = proxy.reorder
-        if (
-            number == reorder.next_sn
-            and not reorder
-            and (proxy.is_local or not proxy.schedule.is_preemptive or not proxy.is_reliable)
-        ):
+        if number == reorder.next_sn and not reorder and (not proxy.schedule.is_preemptive or not proxy.is_reliable):
             if number > proxy.last_seq:
                 proxy.last_seq = number
             if self.history.add(change, now):
@@ -195,11 +191,11 @@ class StatefulReader:
 
     def _progressed(self, proxy: WriterProxy, now: float) -> None:
         before = proxy.next_sn
-        if not proxy.schedule.is_preemptive or proxy.is_local:
+        if not proxy.schedule.is_preemptive or not proxy.is_reliable:
             self._deliver(proxy, now)
         if proxy.next_sn != before:
             proxy.schedule.progress()
-        if not proxy.is_local:
+        if proxy.is_reliable:
             proxy.note_missing(now)
 
     def _deliver(self, proxy: WriterProxy, now: float) -> bool:
@@ -218,7 +214,7 @@ class StatefulReader:
         """The application took samples: deliver what waited for room; returns the proxies whose position moved."""
         moved = [proxy for proxy in self.writers.values() if proxy.reorder and self._deliver(proxy, now)]
         for proxy in moved:
-            if not proxy.is_local and proxy.is_reliable:
+            if proxy.is_reliable:
                 proxy.schedule.acknowledge(now)
         return moved
 

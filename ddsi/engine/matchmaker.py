@@ -223,9 +223,7 @@ class Matchmaker:
         engine.status(writer.guid, writer.match_changed(reader.guid, 1))
         engine.status(reader.guid, reader.match_changed(writer.guid, 1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=1, not_alive=0))
-        for change in writer.behavior.cache.changes():
-            if change.sequence_number > reader_proxy.history_sn:
-                engine.deliver_locally(writer, reader, change, now)
+        engine.deliver_locally(writer, reader, now)
 
     # --- the end of a pair -------------------------------------------------------------------------------
 

@@ -389,7 +389,7 @@ class Participant:
             self.recorder.written(change)
         if behavior.local_readers:
             for guid in list(behavior.local_readers):
-                self.deliver_locally(writer, self.local_readers[guid], change, now)
+                self.deliver_locally(writer, self.local_readers[guid], now)
         if behavior.sends_directly(change):
             self.outbound.send_change(writer, change, now)
         else:
@@ -411,26 +411,37 @@ class Participant:
         writer = self.local_writers[Guid.of(self.guid.prefix, writer_id)]
         return self.write(writer, kind, payload, key, now, key_hash=key if kind is not ChangeKind.ALIVE else b"")
 
-    def deliver_locally(self, writer: LocalWriter, reader: LocalReader, change: CacheChange, now: float) -> None:
-        """Hand a change to a reader of this participant."""
+    def deliver_locally(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
+        """Hand a reader of this participant what the writer holds and it lacks, in order, as far as it has room.
+
+        There is no wire in between, so numbers that are not in the cache, or are for others, are simply stepped over.
+        """
         writer_proxy = reader.behavior.writers[writer.guid]
         reader_proxy = writer.behavior.local_readers[reader.guid]
-        if reader.keys is not None and not change.key:
-            change.key = reader.key_of(change) or b""  # written when nobody here needed it
-        reader.behavior.receive_data(writer_proxy, change, now)
-        writer.behavior.local_reader_progress(reader_proxy, writer_proxy.next_sn - 1, now)
+        cache = writer.behavior.cache
+        number = max(writer_proxy.next_sn, min(cache.first_sn, cache.last_sn + 1))
+        while number <= cache.last_sn:
+            change = cache.get(number)
+            if change is not None and reader_proxy.is_relevant(change):
+                if reader.keys is not None and not change.key:
+                    change.key = reader.key_of(change) or b""  # written when nobody here needed it
+                if not reader.behavior.history.add(change, now):
+                    break
+            number += 1
+        writer_proxy.reorder.next_sn = number
+        writer_proxy.last_seq = cache.last_sn
+        writer.behavior.local_reader_progress(reader_proxy, number - 1, now)
 
     def samples_taken(self, reader: LocalReader, now: float) -> None:
         """The application took samples: what waited for room goes on, and its writers are told."""
         self.now = now
         for proxy in reader.behavior.resume(now):
-            if not proxy.is_local:
-                self.proxy_touched(reader.behavior, proxy)
-                continue
-            writer = self.local_writers[proxy.guid]
-            reader_proxy = writer.behavior.local_readers[reader.guid]
-            writer.behavior.local_reader_progress(reader_proxy, proxy.next_sn - 1, now)
-            self.writer_progressed(writer)
+            self.proxy_touched(reader.behavior, proxy)
+        for guid, proxy in reader.behavior.writers.items():
+            if proxy.is_local and proxy.next_sn <= proxy.last_seq:
+                writer = self.local_writers[guid]
+                self.deliver_locally(writer, reader, now)
+                self.writer_answers(writer, ())
 
     def request_acknowledgment(self, writer: LocalWriter, now: float) -> None:
         """Somebody waits: ask all who lack something, now."""
