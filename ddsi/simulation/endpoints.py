@@ -6,23 +6,24 @@ and octets that follow from writer and number, so that what arrives can be told 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ddsi.behavior.reader_history_cache import ReaderHistoryCache
 from ddsi.behavior.stateful_reader import ChangeSink
 from ddsi.behavior.writer_proxy import WriterProxy
-from ddsi.engine import KeyCodec, LocalReader, LocalWriter
+from ddsi.engine import KeyCodec, LocalReader, LocalWriter, Participant
+from ddsi.engine.recorder import Recorder
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.errors import MalformedSample
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 from ddsi.structure.sample_info import SampleInfo
+from ddsi.trace.sink import TraceSink
 
 if TYPE_CHECKING:
     from .node import Node
 
-__all__ = ["SIMULATED_KEYS", "NodeReader", "NodeWriter", "ReadingSession", "payload_of"]
+__all__ = ["SIMULATED_KEYS", "BookKeeper", "NodeReader", "NodeWriter", "ReadingBook", "ReadingSession", "payload_of"]
 
 _HEADER = b"\x00\x01\x00\x00"  # CDR_LE
 
@@ -119,7 +120,7 @@ class NodeReader:
     once.
     """
 
-    def __init__(self, node: Node, local: LocalReader, *, takes: bool) -> None:
+    def __init__(self, node: Node, local: LocalReader, book: ReadingBook, *, takes: bool) -> None:
         assert local.history is not None
         self.node = node
         self.local = local
@@ -127,10 +128,9 @@ class NodeReader:
         self.topic = local.data.topic_name
         self.takes = takes
         self.history: ReaderHistoryCache = local.history
-        self.sessions: dict[Guid, list[ReadingSession]] = {}
+        self.sessions = book.sessions
         self.taken: list[tuple[SampleInfo, CacheChange]] = []
         self.is_deleted = False
-        local.behavior.history = _Recorder(local.behavior.history, self._record)
 
     def __repr__(self) -> str:
         return f"<NodeReader {self.topic} of {self.node.name}, {sum(map(len, self.sessions.values()))} sessions>"
@@ -158,8 +158,24 @@ class NodeReader:
         self.node.engine.delete_reader(self.local, self.node.now)
         self.node.pump()
 
-    def _record(self, change: CacheChange) -> None:
-        proxy = self.local.behavior.writers.get(change.writer_guid)
+
+class ReadingBook:
+    """A ChangeSink in front of a reader's history: notes what that accepted, from the first sample on."""
+
+    def __init__(self, engine: Participant, reader: Guid, history: ChangeSink) -> None:
+        self.sessions: dict[Guid, list[ReadingSession]] = {}
+        self._engine = engine
+        self._reader = reader
+        self._history = history
+
+    def add(self, change: CacheChange, now: float) -> bool:
+        accepted = self._history.add(change, now)
+        if accepted:
+            self._note(change)
+        return accepted
+
+    def _note(self, change: CacheChange) -> None:
+        proxy = self._engine.local_readers[self._reader].behavior.writers.get(change.writer_guid)
         sessions = self.sessions.setdefault(change.writer_guid, [])
         # Without a proxy the match has just ended, and what waited behind a gap is handed over.
         if not sessions or (proxy is not None and sessions[-1].proxy is not proxy):
@@ -167,17 +183,14 @@ class NodeReader:
         sessions[-1].changes.append(change)
 
 
-class _Recorder:
-    """A ChangeSink in front of the real one: notes what that accepted."""
+class BookKeeper(Recorder):
+    """The engine's recorder, which also keeps a book for each reader, trace or no trace."""
 
-    __slots__ = ("_record", "_sink")
+    def __init__(self, engine: Participant, trace: TraceSink | None) -> None:
+        super().__init__(engine, trace)
+        self._participant = engine
+        self.books: dict[Guid, ReadingBook] = {}
 
-    def __init__(self, sink: ChangeSink, record: Callable[[CacheChange], None]) -> None:
-        self._sink = sink
-        self._record = record
-
-    def add(self, change: CacheChange, now: float) -> bool:
-        accepted = self._sink.add(change, now)
-        if accepted:
-            self._record(change)
-        return accepted
+    def delivering(self, reader: Guid, history: ChangeSink) -> ChangeSink:
+        book = self.books[reader] = ReadingBook(self._participant, reader, super().delivering(reader, history))
+        return book

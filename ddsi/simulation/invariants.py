@@ -1,7 +1,7 @@
 """What must hold in every run, whatever the network did: checked after each simulated scenario.
 
-Each function looks at a domain and returns what is wrong, in words; an empty list is what everybody hopes for.  Some hold at any
-moment, others only once nothing is written any more and the network lets things through (*at rest*).
+Each function looks at a domain and returns what is wrong, in words; an empty list is what everybody hopes for.  Some
+hold at any moment, others only once nothing is written any more and the network lets things through (*at rest*).
 
 1. No sample twice, none out of order, and each as it was written (any moment).
 2. A reliable reader holds exactly what its matched writers hold or held for it since the match (at rest).
@@ -22,6 +22,7 @@ from ddsi.structure.builtin_entity_ids import SPDP_WRITER
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos_policies import KeepAll, KeepLast
+from ddsi.structure.status import PublicationMatched
 
 from .domain import Domain
 from .endpoints import NodeReader, NodeWriter
@@ -97,8 +98,8 @@ def _taking_flaws(reader: NodeReader) -> Iterator[str]:
 
 
 def complete(domain: Domain) -> list[str]:
-    """A reliable reader has all that its writer wrote since they matched (or holds as history), but for what KEEP_LAST or
-    LIFESPAN have since removed."""
+    """A reliable reader has all that its writer wrote since they matched (or holds as history), but for what
+    KEEP_LAST or LIFESPAN have since removed."""
     wrong: list[str] = []
     for writer, reader in domain.fitting_pairs():
         if writer.local.data.qos.is_reliable and reader.local.data.qos.is_reliable:
@@ -128,8 +129,20 @@ def _gaps(writer: NodeWriter, reader: NodeReader) -> Iterator[str]:
     if foreign:
         yield f"{_pair(writer, reader)}: {_some(foreign)} came, which were for others"
     early = [number for number in session if number <= proxy.history_sn]
-    if early and not writer.local.data.qos.is_transient_local:
+    # Where the writer lost the reader for a while and the reader never noticed, its session began earlier.
+    if early and not writer.local.data.qos.is_transient_local and _match_count(writer, reader) == 1:
         yield f"{_pair(writer, reader)}: {_some(early)} came, which were written before the match"
+
+
+def _match_count(writer: NodeWriter, reader: NodeReader) -> int:
+    """How often the writer found this reader."""
+    return sum(
+        entity == writer.guid
+        and isinstance(status, PublicationMatched)
+        and status.last_subscription_handle == reader.guid
+        and status.current_count_change > 0
+        for _, entity, status in writer.node.statuses
+    )
 
 
 def _replaceable(writer: NodeWriter) -> set[int]:
@@ -232,7 +245,8 @@ def _unmatched(domain: Domain) -> Iterator[str]:
             yield f"{_pair(writer, reader)}: the writer has not matched"
         if writer.guid not in reader.local.behavior.writers:
             yield f"{_pair(writer, reader)}: the reader has not matched"
-    for endpoint in (*domain.writers(), *domain.readers()):
+    endpoints: list[NodeWriter | NodeReader] = [*domain.writers(), *domain.readers()]
+    for endpoint in endpoints:
         fitting = sum(endpoint in pair for pair in domain.fitting_pairs())
         if endpoint.matched_count != fitting:
             yield f"{endpoint}: {endpoint.matched_count} matched, {fitting} fit"

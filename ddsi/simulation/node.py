@@ -31,7 +31,7 @@ from ddsi.trace.events import Remark
 from ddsi.trace.sink import TraceSink
 
 from .dice import Dice
-from .endpoints import SIMULATED_KEYS, NodeReader, NodeWriter
+from .endpoints import SIMULATED_KEYS, BookKeeper, NodeReader, NodeWriter
 from .network import Network, Port
 
 __all__ = ["Node", "NodeSetup"]
@@ -124,6 +124,7 @@ class Node:
             hooks=setup.make_hooks(),
             trace=self._trace,
         )
+        engine.recorder = self._books = BookKeeper(engine, self._trace)
         self.port = Port(metatraffic, prefix, self._receive)
         self._user_port = Port(user, prefix, self._receive)
         self.network.open(self.port, groups)
@@ -188,7 +189,7 @@ class Node:
     ) -> NodeReader:
         keys = SIMULATED_KEYS if keyed else None
         local = self.engine.create_reader(topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys)
-        reader = NodeReader(self, local, takes=takes)
+        reader = NodeReader(self, local, self._books.books[local.guid], takes=takes)
         self.readers.append(reader)
         self.pump()
         return reader

@@ -1,7 +1,7 @@
 """Scenario: a random piece of life of a domain, all of it from one seed, and the check of every invariant at its end.
 
-A scenario is made first and lived through afterwards: :attr:`Scenario.steps` are plain values that can be printed, so a failing
-seed tells what it did.  Its sizes are those of tests: a second scenario teaches more than a long one.
+A scenario is made first and lived through afterwards: :attr:`Scenario.steps` are plain values that can be printed,
+so a failing seed tells what it did.  Its sizes are those of tests: a second scenario teaches more than a long one.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from ddsi.trace.sink import TraceSink
 from . import invariants
 from .dice import Dice
 from .domain import Domain
-from .link import LinkConditions
+from .endpoints import NodeReader, NodeWriter
+from .link import GOOD_WEATHER, LinkConditions
 from .node import Node
 
 __all__ = ["Failure", "Report", "Scenario"]
@@ -185,7 +186,9 @@ class _Planner:
         dice = self._dice
         node_count = dice.pick((2, 2, 2, 3, 3, 4))
         multicast = dice.chance(0.8)
-        hosts = [f"10.0.0.{1 + (dice.below(number + 1) if dice.chance(0.2) else number)}" for number in range(node_count)]
+        hosts = [
+            f"10.0.0.{1 + (dice.below(number + 1) if dice.chance(0.2) else number)}" for number in range(node_count)
+        ]
         scenario = Scenario(
             seed=self._seed,
             conditions=self._weather(),
@@ -234,7 +237,8 @@ class _Planner:
     def _endpoint(self, node: int, *, is_writer: bool, topic: int, reliable: bool) -> EndpointPlan:
         dice = self._dice
         name, is_keyed = self._topics[topic]
-        history: History = dice.pick((KeepAll(), KeepAll(), KeepLast(1), KeepLast(5)))
+        histories: tuple[History, ...] = (KeepAll(), KeepAll(), KeepLast(1), KeepLast(5))
+        history = dice.pick(histories)
         limits = ResourceLimits()
         if isinstance(history, KeepAll) and dice.chance(0.2):
             limits = ResourceLimits(max_samples=20)
@@ -300,7 +304,9 @@ class _Run:
             self._check(f"after {step}", invariants.always(domain))
         self._settle()
         self._check("at rest", invariants.at_rest(domain))
+        self._clear_up()
         self._check("in the quiet after it", invariants.quiet(domain, _QUIET_S))
+        self._check("at the end", invariants.at_rest(domain))
         return self._report()
 
     def _settle(self) -> None:
@@ -317,6 +323,13 @@ class _Run:
         domain.run(1.0)
         if not domain.run_until(lambda: invariants.is_at_rest(domain), _REST_S):
             self._check(f"{_REST_S} s later", ["not at rest", *invariants.at_rest(domain)])
+
+    def _clear_up(self) -> None:
+        """Good weather from here on: where announcements get lost, a lease may run out at any time."""
+        domain = self._domain
+        domain.network.conditions = GOOD_WEATHER
+        domain.run(5.0)
+        domain.run_until(lambda: domain.all_matched() and invariants.is_at_rest(domain), _INTRODUCTION_S)
 
     def _check(self, when: str, flaws: list[str]) -> None:
         if flaws:
@@ -384,8 +397,6 @@ class _Run:
                 self._domain.run(0.0005)
 
     def _delete(self, choice: int) -> None:
-        endpoints = [*self._domain.writers(), *self._domain.readers()]
-        if not endpoints:
-            return
-        endpoint = endpoints[choice % len(endpoints)]
-        endpoint.delete()
+        endpoints: list[NodeWriter | NodeReader] = [*self._domain.writers(), *self._domain.readers()]
+        if endpoints:
+            endpoints[choice % len(endpoints)].delete()
