@@ -19,6 +19,7 @@ from ..config import Config
 from ..config.environment import load_config
 from ..discovery.matching import MatchRefusal
 from ..engine import DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
+from ..structure.builtin_entity_ids import SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["DomainParticipant"]
 
 _HIGHEST_DOMAIN = 232
+_SEDP_READERS = (SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER)
 _LINGER_S = 1.0
 
 
@@ -158,6 +160,15 @@ class DomainParticipant(Entity):
     def discovered_subscriptions(self) -> list[DiscoveredReaderData]:
         """The remote readers that are known now."""
         return list(self._running_pump().engine.known_readers.all())
+
+    def knows_all_announced(self) -> bool:
+        """Has every endpoint come that the participants known now had when they were discovered?
+
+        RTPS 2.5 §8.5.4: SEDP is transient-local, so each of its writers says at the match how much there is to come.
+        """
+        engine = self._running_pump().engine
+        readers = (engine.local_readers[Guid.of(engine.guid.prefix, reader_id)] for reader_id in _SEDP_READERS)
+        return all(proxy.has_historical_data for reader in readers for proxy in reader.behavior.writers.values())
 
     def match_refusals(self) -> dict[tuple[Guid, Guid], MatchRefusal]:
         """For every (own, other) pair of endpoints of one topic that does not match: why not."""
