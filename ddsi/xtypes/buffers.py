@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from typing import Any
 
 __all__ = [
+    "NOT_SEQUENCES",
     "array_numbers",
     "array_octets",
     "booleans",
@@ -58,9 +59,7 @@ def octets(value: Any) -> Buffer:
     try:
         view = memoryview(value)
     except TypeError:
-        if isinstance(value, (str, int)) or not hasattr(value, "__len__"):
-            raise TypeError(f"not octets: {type(value).__name__}") from None
-        return bytes(value)
+        return bytes(_sequence(value))
     if view.itemsize != 1:
         return bytes(view.tolist())
     if view.format in ("b", "<b"):  # signed: -1 is no octet
@@ -85,9 +84,7 @@ def numbers(value: Any, code: str, size: int, order: str, *, swap: bool) -> tupl
     try:
         view = memoryview(value)
     except (TypeError, ValueError):
-        if isinstance(value, str) or not hasattr(value, "__len__"):
-            raise TypeError(f"not a sequence of numbers: {type(value).__name__}") from None
-        return numbers(list(value), code, size, order, swap=swap)
+        return numbers(list(_sequence(value)), code, size, order, swap=swap)
     return _numbers_of_view(view, code, size, order, swap=swap)
 
 
@@ -126,13 +123,7 @@ def number_array(code: str, buffer: Any, start: int, end: int, *, swap: bool) ->
 
 def booleans(value: Any) -> bytes:
     """One octet for each, 0 or 1.  Raises TypeError unless all are booleans (Python's or numpy's)."""
-    if isinstance(value, str) or not hasattr(value, "__len__"):
-        raise TypeError(f"not a sequence of booleans: {type(value).__name__}")
-    if isinstance(value, (bytes, bytearray)):
-        value = list(value)
-    elif hasattr(value, "tolist"):
-        value = value.tolist()
-    packed = bytes(value)
+    packed = bytes(value.tolist() if hasattr(value, "tolist") else list(_sequence(value)))
     if packed.strip(b"\x00\x01"):
         raise ValueError("a boolean is True or False")
     return packed
@@ -162,10 +153,20 @@ def wchars_from(packed: Any, *, little_endian: bool) -> str:
 
 
 def _joined(value: Iterable[str]) -> str:
-    items = list(value)
+    items = list(_sequence(value))
     if any(len(item) != 1 for item in items):
         raise ValueError("a char is a string of one character")
     return "".join(items)
+
+
+NOT_SEQUENCES = frozenset({str, dict, set, frozenset})
+"""What can be iterated over, but is no sequence of elements."""
+
+
+def _sequence(value: Any) -> Any:
+    if value.__class__ in NOT_SEQUENCES or not hasattr(value, "__getitem__") or not hasattr(value, "__len__"):
+        raise TypeError(f"not a sequence: {type(value).__name__}")
+    return value
 
 
 def flatten(value: Any, dimensions: tuple[int, ...]) -> Any:
@@ -174,6 +175,7 @@ def flatten(value: Any, dimensions: tuple[int, ...]) -> Any:
     Raises ValueError unless each level has its dimension.  A buffer, or a flat sequence of all the elements,
     is taken as it is when its size fits.
     """
+    _sequence(value)
     if len(dimensions) == 1:
         if len(value) != dimensions[0]:
             raise ValueError(f"{len(value)} elements where the array has {dimensions[0]}")
@@ -182,9 +184,7 @@ def flatten(value: Any, dimensions: tuple[int, ...]) -> Any:
     if shape is not None and tuple(shape) == dimensions:
         return value.reshape(-1) if hasattr(value, "reshape") else value
     total = math.prod(dimensions)
-    if not isinstance(value, (list, tuple)) and not hasattr(value, "__getitem__"):
-        raise TypeError(f"not an array: {type(value).__name__}")
-    if len(value) == total and len(value) != dimensions[0]:
+    if len(value) == total != dimensions[0] and (shape is None or len(shape) == 1):
         return value
     if len(value) != dimensions[0]:
         raise ValueError(f"{len(value)} rows where the array has {dimensions[0]}")

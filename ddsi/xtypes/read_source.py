@@ -328,6 +328,8 @@ class _TypeReader:
         emitter.then(f"{end} = {start} + {count} * {size}")
         expression = self.value(element)
         codes, names = emitter.take_run()
+        leading = size - struct.calcsize(self._encoding.order + codes)  # where elements begin with padding
+        codes = f"{leading}x{codes}" if leading else codes
         iterator = source.define("iter_unpack_", f'Struct("{self._encoding.order}{codes}").iter_unpack')
         with source.block(f"for {', '.join(names)}, in {iterator}(d[{start}:{end}]):"):
             emitter.emit_held()
@@ -441,15 +443,15 @@ class _TypeReader:
         return value
 
     def _optional_parameter(self, member: Member, end: str) -> str:
-        """Present if the next header is this member's."""
+        """Present if the next header is this member's.  If not, not even the padding before it is there."""
         emitter = self._emitter
-        emitter.align(4)
+        value, aligned = self._source.fresh("x"), self._source.fresh("q")
         emitter.flush()
-        value = self._source.fresh("x")
+        emitter.then(f"{aligned} = {emitter.position_after(3)} & -4")
         header = self._header_octets(member)
-        condition = f"d[{emitter.position}:{emitter.position_after(len(header))}] == {header!r}"
+        condition = f"d[{aligned}:{aligned} + {len(header)}] == {header!r}"
         with emitter.branches() as alternatives:
-            with alternatives.branch(f"if {emitter.position} < {end} and {condition}:" if end else f"if {condition}:"):
+            with alternatives.branch(f"if {aligned} < {end} and {condition}:" if end else f"if {condition}:"):
                 self._assign(value, self._parameter(member))
             with alternatives.branch("else:"):
                 emitter.then(f"{value} = None")

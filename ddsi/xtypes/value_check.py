@@ -127,7 +127,7 @@ def _check_array(type_: ArrayType, value: Any, path: str, depth: int) -> None:
     flat: Any = None
     with contextlib.suppress(TypeError, ValueError):
         flat = flatten(value, type_.dimensions)
-    if flat is None or type_.count != (memoryview(flat).nbytes // _itemsize(flat) if _is_buffer(flat) else len(flat)):
+    if flat is None or _number_of_elements(flat) != type_.count:
         raise BadParameter(f"{path}: {_shape(value)} elements where the array has {_times(type_.dimensions)}")
     _check_elements(type_.element, flat, path, depth)
 
@@ -183,8 +183,11 @@ def _is_buffer(value: Any) -> bool:
     return True
 
 
-def _itemsize(value: Any) -> int:
-    return memoryview(value).itemsize
+def _number_of_elements(value: Any) -> int:
+    if not _is_buffer(value):
+        return len(value)
+    view = memoryview(value)
+    return view.nbytes // view.itemsize
 
 
 def _shape(value: Any) -> str:

@@ -76,7 +76,10 @@ def generate_writer(
     return source.compile("write"), source.text
 
 
-_RUNTIME = ("array_numbers", "array_octets", "booleans", "chars", "flatten", "numbers", "octets", "wchars")
+_RUNTIME = (
+    *("array_numbers", "array_octets", "booleans", "chars", "flatten", "numbers", "octets", "wchars"),
+    "NOT_SEQUENCES",
+)
 
 
 def enum_values(values: Any, python_class: type[enum.IntEnum]) -> list[int]:
@@ -264,7 +267,7 @@ class _TypeWriter:
                 f"{value} = enum_values({value}, {self._source.constant('Enum', type_.element.python_class)})"
             )
         count = self._local("n", f"len({value})")
-        condition = f"{value}.__class__ is str"
+        condition = f"{value}.__class__ in NOT_SEQUENCES"
         self._refuse(condition if type_.bound is None else f"{count} > {type_.bound} or {condition}")
         delimiter = self._open_dheader(type_)
         emitter.align(4)
@@ -278,7 +281,6 @@ class _TypeWriter:
             self._source.line(
                 f"{value} = enum_values({value}, {self._source.constant('Enum', type_.element.python_class)})"
             )
-        self._refuse(f"{value}.__class__ is str")
         delimiter = self._open_dheader(type_)
         self._elements(type_, type_.element, value, str(type_.count))
         self._close_dheader(delimiter)
