@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 import trio
 
 from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
 from ..engine import KeyCodec, LocalReader
 from ..structure.cache_change import CacheChange
-from ..structure.errors import MalformedSample, PreconditionNotMet
+from ..structure.errors import DdsTimeout, MalformedSample
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, reader_qos
 from ..structure.qos_policies import DataRepresentation, DataRepresentationId
 from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
+from ..structure.status import (
+    InconsistentTopic,
+    LivelinessChanged,
+    RequestedDeadlineMissed,
+    RequestedIncompatibleQos,
+    SampleLost,
+    SampleRejected,
+    SecurityRefused,
+    Status,
+    SubscriptionMatched,
+)
 from .conditions import ReadCondition
-from .entity import Entity
-from .groups import Subscriber
+from .entity import Entity, deadline_scope
+from .groups import Subscriber, check_family
 from .sample import Sample
 from .topic import Topic
 
@@ -28,24 +40,34 @@ __all__ = ["DataReader"]
 
 T = TypeVar("T")
 
+_LOOK_FOR_HISTORY_S = 0.005
 _UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
 
 
 class DataReader(Entity, Generic[T]):
     """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``, which never wait."""
 
+    STATUSES: ClassVar[tuple[type, ...]] = (
+        SubscriptionMatched,
+        RequestedIncompatibleQos,
+        LivelinessChanged,
+        RequestedDeadlineMissed,
+        SampleLost,
+        SampleRejected,
+        InconsistentTopic,
+        SecurityRefused,
+    )
+
     def __init__(self, parent: DomainParticipant | Subscriber, topic: Topic[T], qos: Qos | None = None) -> None:
         """``qos`` goes before the subscriber's, and that before the topic's; the rest is the OMG's default.
 
         Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """
+        participant = check_family(parent, topic, Subscriber)
         group_qos = parent.qos if isinstance(parent, Subscriber) else Qos()
-        super().__init__(topic.qos | group_qos | (qos or Qos()))
-        participant = parent.participant if isinstance(parent, Subscriber) else parent
-        parent._check_open()
-        topic._check_open()
-        if topic.participant is not participant:
-            raise PreconditionNotMet(f"topic {topic.name!r} belongs to another participant")
+        super().__init__(qos)
+        self._qos = topic.qos | group_qos | self._qos
+        self._parent = parent
         self._participant = participant
         self._topic = topic
         support = topic.type_support
@@ -53,6 +75,7 @@ class DataReader(Entity, Generic[T]):
         self._deserialize_key = support.deserialize_key
         self._endpoint_qos = _with_representations(reader_qos(self._qos))
         self._news = trio.lowlevel.ParkingLot()
+        self._undecodable: list[CacheChange] = []
         self._pump = participant._running_pump()
         self._reader: LocalReader = self._pump.engine.create_reader(
             topic.name,
@@ -93,7 +116,7 @@ class DataReader(Entity, Generic[T]):
     async def __anext__(self) -> Sample[T]:
         """Take the next sample, waiting for one.  Iteration ends when the reader is closed."""
         await self._pump.checkpoint(self._pump.now())
-        while True:
+        while not self._is_closed:
             taken = self._history.take_next()
             if taken is not None:
                 sample = self._sample(*taken)
@@ -101,9 +124,8 @@ class DataReader(Entity, Generic[T]):
                 if sample is not None:
                     return sample
                 continue
-            if self._is_closed:
-                raise StopAsyncIteration
             await self._wait_for_news()
+        raise StopAsyncIteration
 
     def take(
         self,
@@ -118,12 +140,14 @@ class DataReader(Entity, Generic[T]):
         """Samples that are here now, oldest first, removed from the reader; never waits.
 
         ``max_samples``: at most so many.  Masks select by state, ``condition`` brings masks of its own,
-        ``instance`` (an ``info.instance_handle``) selects one instance.
+        ``instance`` (an ``info.instance_handle``) selects one instance.  Raises AlreadyDeleted.
         """
+        self._check_open()
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.seen()
         taken = self._history.take(max_samples, **states, instance=instance, selector=selector)
         samples = [sample for info, change in taken if (sample := self._sample(info, change)) is not None]
+        self._drop_undecodable()
         self._after_taking()
         return samples
 
@@ -138,18 +162,27 @@ class DataReader(Entity, Generic[T]):
         instance: bytes | None = None,
     ) -> list[Sample[T]]:
         """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
+        self._check_open()
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.seen()
         found = self._history.read(max_samples, **states, instance=instance, selector=selector)
-        return [sample for info, change in found if (sample := self._sample(info, change)) is not None]
+        samples = [sample for info, change in found if (sample := self._sample(info, change)) is not None]
+        self._drop_undecodable()
+        return samples
 
     async def wait(self, condition: ReadCondition | None = None) -> None:
-        """Until there is a sample that fits ``condition`` (none given: one that has not been read)."""
+        """Until there is a sample that fits ``condition`` (none given: one that has not been read).
+
+        Raises AlreadyDeleted, also when the reader is closed meanwhile.
+        """
+        self._check_open()
         await self._pump.checkpoint(self._pump.now())
         states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
         while not self._history.matches(selector=selector, **states):
+            self._drop_undecodable()
             self._check_open()
             await self._wait_for_news()
+        self._drop_undecodable()
 
     def lookup_instance(self, sample: T) -> bytes | None:
         """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
@@ -170,10 +203,16 @@ class DataReader(Entity, Generic[T]):
 
         DDS 1.4 §2.2.2.5.3.31.  Returns at once where no matched writer keeps history.
         """
-        await self._participant._wait_until(
-            self, lambda: all(proxy.has_historical_data for proxy in self._reader.behavior.writers.values()), timeout,
-            f"reader of {self._topic.name!r} still lacks historical data",
-        )  # fmt: skip
+        self._check_open()
+        with deadline_scope(timeout):
+            self._pump.before_waiting()
+            await trio.lowlevel.checkpoint()
+            # Looked at now and then: a HEARTBEAT that says "there was nothing" is no news for anybody else.
+            while not all(proxy.has_historical_data for proxy in self._reader.behavior.writers.values()):
+                await trio.sleep(_LOOK_FOR_HISTORY_S)
+                self._check_open()
+            return
+        raise DdsTimeout(f"reader of {self._topic.name!r} still lacks historical data after {timeout} s")
 
     def matched_publications(self) -> list[Guid]:
         """The Guids of the writers that are matched now."""
@@ -198,9 +237,18 @@ class DataReader(Entity, Generic[T]):
                 return Sample(self._deserialize(change.payload), info)
             return Sample(self._key_sample(change, info), info)
         except MalformedSample as error:
-            self._pump.engine.sample_malformed(self._reader, change, str(error))
-            self._pump.settle()
+            if not any(change is known for known in self._undecodable):
+                self._undecodable.append(change)
+                self._pump.engine.sample_malformed(self._reader, change, str(error))
+                self._pump.settle()
             return None
+
+    def _drop_undecodable(self) -> None:
+        """What was found not to decode while it stays in the cache: nobody shall meet it again."""
+        if self._undecodable:
+            undecodable, self._undecodable = self._undecodable, []
+            self._history.take(selector=lambda info: any(info.change is known for known in undecodable))
+            self._after_taking()
 
     def _key_sample(self, change: CacheChange, info: SampleInfo) -> T:
         if len(change.payload) >= 4:
@@ -228,15 +276,21 @@ class DataReader(Entity, Generic[T]):
         states = {"sample_states": sample_states, "view_states": view_states, "instance_states": instance_states}
         return states, selector
 
-    def _selector(self, query: object) -> SampleSelector:
+    def _selector(self, query: Callable[[T], bool]) -> SampleSelector:
         def selects(info: SampleInfo) -> bool:
             change = info.change
             sample = self._sample(info, change) if change is not None else None
-            return sample is not None and callable(query) and bool(query(sample.data))
+            return sample is not None and bool(query(sample.data))
 
         return selects
 
+    def _status_changed(self, status: Status) -> None:
+        if isinstance(status, InconsistentTopic):
+            self._topic._found_inconsistent(status.remote_type_name)
+        super()._status_changed(status)
+
     def _on_close(self) -> None:
+        self._parent._disown(self)
         self._news.unpark_all()
         self._participant._deregister(self._reader.guid)
         self._participant._when_running(lambda pump: pump.engine.delete_reader(self._reader, pump.now()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from datetime import datetime
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 import trio
 
@@ -15,10 +15,18 @@ from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, writer_qos
 from ..structure.qos_policies import DataRepresentation, DataRepresentationId
-from ..structure.status import PublicationMatched
+from ..structure.status import (
+    InconsistentTopic,
+    LivelinessLost,
+    OfferedDeadlineMissed,
+    OfferedIncompatibleQos,
+    PublicationMatched,
+    SecurityRefused,
+    Status,
+)
 from ..structure.time import Time
-from .entity import Entity
-from .groups import Publisher
+from .entity import Entity, deadline_scope
+from .groups import Publisher, check_family
 from .topic import Topic
 
 if TYPE_CHECKING:
@@ -33,18 +41,25 @@ Timestamp = float | datetime
 class DataWriter(Entity, Generic[T]):
     """Writes samples of a topic; created without waiting, closed with its participant or by ``close()``."""
 
+    STATUSES: ClassVar[tuple[type, ...]] = (
+        PublicationMatched,
+        OfferedIncompatibleQos,
+        LivelinessLost,
+        OfferedDeadlineMissed,
+        InconsistentTopic,
+        SecurityRefused,
+    )
+
     def __init__(self, parent: DomainParticipant | Publisher, topic: Topic[T], qos: Qos | None = None) -> None:
         """``qos`` goes before the publisher's, and that before the topic's; the rest is the OMG's default (reliable).
 
         Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """
+        participant = check_family(parent, topic, Publisher)
         group_qos = parent.qos if isinstance(parent, Publisher) else Qos()
-        super().__init__(topic.qos | group_qos | (qos or Qos()))
-        participant = parent.participant if isinstance(parent, Publisher) else parent
-        parent._check_open()
-        topic._check_open()
-        if topic.participant is not participant:
-            raise PreconditionNotMet(f"topic {topic.name!r} belongs to another participant")
+        super().__init__(qos)
+        self._qos = topic.qos | group_qos | self._qos
+        self._parent = parent
         self._participant = participant
         self._topic = topic
         support = topic.type_support
@@ -91,11 +106,11 @@ class DataWriter(Entity, Generic[T]):
         then at most ``max_blocking_time``: DdsTimeout.  ``timestamp``: seconds since 1970 or a datetime; now.
         Raises BadParameter, naming the member, when the sample cannot be serialised; AlreadyDeleted.
         """
-        if self._is_closed:
-            self._check_open()
         pump = self._pump
         now = pump.now()
         await pump.checkpoint(now)
+        if self._is_closed:
+            self._check_open()
         writer = self._writer
         payload = self._serialize(sample)
         key = self._key(sample) if self._is_keyed and writer.behavior.needs_key else b""
@@ -118,11 +133,11 @@ class DataWriter(Entity, Generic[T]):
         await self._write_end(kind, sample, timestamp)
 
     async def _write_end(self, kind: ChangeKind, sample: T, timestamp: Timestamp | None) -> None:
-        self._check_open()
         if not self._is_keyed:
             raise PreconditionNotMet(f"topic {self._topic.name!r} has no key, so it has no instances to end")
         now = self._pump.now()
         await self._pump.checkpoint(now)
+        self._check_open()
         payload = self._serialize_key(sample)
         key = self._support.key(sample)
         if self._writer.behavior.lacks_room(len(payload), key) is not None:
@@ -178,7 +193,7 @@ class DataWriter(Entity, Generic[T]):
         await trio.lowlevel.checkpoint()
         behavior = self._writer.behavior
         last_sn = behavior.cache.last_sn
-        with trio.move_on_after(timeout) if timeout is not None else trio.CancelScope():
+        with deadline_scope(timeout):
             self._pump.settle()
             asked_at = -1
             while behavior.min_acked_sn() < last_sn:
@@ -213,14 +228,16 @@ class DataWriter(Entity, Generic[T]):
     def _made_progress(self) -> None:
         self._progress.unpark_all()
 
+    def _status_changed(self, status: Status) -> None:
+        if isinstance(status, InconsistentTopic):
+            self._topic._found_inconsistent(status.remote_type_name)
+        super()._status_changed(status)
+
     def _on_close(self) -> None:
+        self._parent._disown(self)
         self._progress.unpark_all()
         self._participant._deregister(self._writer.guid)
         self._participant._when_running(lambda pump: pump.engine.delete_writer(self._writer, pump.now()))
-
-    def status_of_match(self) -> PublicationMatched:
-        """How many readers are matched, and were."""
-        return self._writer.matched
 
 
 def _with_representation(qos: EndpointQos, possible: tuple[DataRepresentationId, ...], topic: Topic[T]) -> EndpointQos:

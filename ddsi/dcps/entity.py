@@ -7,15 +7,19 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import AsyncIterator
-from typing import TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+from weakref import WeakSet
 
 import trio
 
-from ..structure.errors import AlreadyDeleted
+from ..structure.errors import AlreadyDeleted, BadParameter
 from ..structure.qos import Qos
 from ..structure.status import Status
 
-__all__ = ["Entity", "EventStream"]
+if TYPE_CHECKING:
+    from .participant import DomainParticipant
+
+__all__ = ["Entity", "EventStream", "Parent", "deadline_scope"]
 
 _S = TypeVar("_S")
 _MAX_EVENTS = 1024
@@ -60,12 +64,18 @@ class EventStream(AsyncIterator[Status]):
 class Entity:
     """The base of all entities.  ``close()`` is synchronous, may be called twice, and closes what is inside first."""
 
+    STATUSES: ClassVar[tuple[type, ...]] = ()
+    """The kinds of status that such an entity has, and of its events."""
+
     def __init__(self, qos: Qos | None) -> None:
+        if qos is not None and not isinstance(qos, Qos):
+            raise BadParameter(f"{type(self).__name__}: qos is a ddsi.Qos(...), not {qos!r}")
         self._qos = qos if qos is not None else Qos()
         self._is_closed = False
         self._changed = trio.lowlevel.ParkingLot()
         self._statuses: dict[type, Status] = {}
-        self._streams: list[EventStream] = []
+        # Weakly: a stream lives as long as somebody reads it, and ends with the loop that did.
+        self._streams: WeakSet[EventStream] = WeakSet()
         # What happened before anybody listened (a match within the participant happens at once).
         self._early_events: deque[Status] = deque(maxlen=_MAX_EARLY_EVENTS)
 
@@ -79,16 +89,25 @@ class Entity:
         return self._is_closed
 
     def events(self) -> EventStream:
-        """The communication statuses from now on (the first caller also gets what came before), one event a change."""
+        """The communication statuses from now on, one event a change.
+
+        What happened while nobody listened (the latest 64) comes first.
+        """
         stream = EventStream(self._early_events)
         self._early_events.clear()
         if self._is_closed:
             stream.close()
-        self._streams.append(stream)
+        self._streams.add(stream)
         return stream
 
     def status(self, kind: type[_S]) -> _S:
-        """The present value of one status, for instance ``writer.status(PublicationMatched).current_count``."""
+        """The present value of one status, for instance ``writer.status(PublicationMatched).current_count``.
+
+        Raises BadParameter where an entity of this kind has no such status.
+        """
+        if kind not in self.STATUSES:
+            names = ", ".join(known.__name__ for known in self.STATUSES) or "none"
+            raise BadParameter(f"a {type(self).__name__} has the statuses {names}, but no {kind!r}")
         value = self._statuses.get(kind)
         return value if isinstance(value, kind) else kind()
 
@@ -121,4 +140,36 @@ class Entity:
 
     def _check_open(self) -> None:
         if self._is_closed:
-            raise AlreadyDeleted(f"this {type(self).__name__} was closed before")
+            raise AlreadyDeleted(f"{self!r} was closed, by close() or with what it belongs to; make another")
+
+
+class Parent(Entity):
+    """An entity that others belong to, and end with: DomainParticipant, Publisher, Subscriber."""
+
+    def __init__(self, qos: Qos | None) -> None:
+        super().__init__(qos)
+        self._members: dict[Entity, None] = {}
+
+    @property
+    def participant(self) -> DomainParticipant:
+        """The participant that it belongs to, or is."""
+        raise NotImplementedError
+
+    def _adopt(self, entity: Entity) -> None:
+        self._members[entity] = None
+
+    def _disown(self, entity: Entity) -> None:
+        self._members.pop(entity, None)
+
+    def _on_close(self) -> None:
+        for entity in reversed(list(self._members)):
+            entity.close()
+
+
+def deadline_scope(timeout: float | None) -> trio.CancelScope:
+    """A scope that ends ``timeout`` seconds from now; None, as ``math.inf``: never.  Raises BadParameter."""
+    if timeout is None:
+        return trio.CancelScope()
+    if not isinstance(timeout, (int, float)) or not timeout >= 0:
+        raise BadParameter(f"timeout is a number of seconds, 0 or more, or None to wait for ever, not {timeout!r}")
+    return trio.move_on_after(timeout)

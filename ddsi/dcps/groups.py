@@ -5,35 +5,36 @@ DDS 1.4 §2.2.2.4.1 (Publisher), §2.2.2.5.2 (Subscriber).  A participant may st
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ..structure.errors import BadParameter, PreconditionNotMet
 from ..structure.qos import Qos
-from .entity import Entity
+from .entity import Parent
+from .topic import Topic
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
 
-__all__ = ["Publisher", "Subscriber"]
+__all__ = ["Publisher", "Subscriber", "check_family"]
 
 
-class _Group(Entity):
+class _Group(Parent):
     def __init__(self, participant: DomainParticipant, qos: Qos | None = None) -> None:
         super().__init__(qos)
-        participant._check_open()
+        participant._running_pump()
         self._participant = participant
-        self._members: list[Entity] = []
         participant._adopt(self)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} in domain {self._participant.domain_id}, {len(self._members)} members>"
 
     @property
     def participant(self) -> DomainParticipant:
         return self._participant
 
-    def _adopt(self, entity: Entity) -> None:
-        self._members.append(entity)
-
     def _on_close(self) -> None:
-        for entity in self._members:
-            entity.close()
+        super()._on_close()
+        self._participant._disown(self)
 
 
 class Publisher(_Group):
@@ -42,3 +43,21 @@ class Publisher(_Group):
 
 class Subscriber(_Group):
     """The readers created with it have its policies wherever they do not set their own."""
+
+
+def check_family(parent: Parent, topic: Topic[Any], group: type[Publisher] | type[Subscriber]) -> DomainParticipant:
+    """The participant in which ``parent`` (itself, or such a ``group`` of it) makes an endpoint of ``topic``.
+
+    Raises BadParameter, PreconditionNotMet (not entered; the topic is another participant's), AlreadyDeleted.
+    """
+    if not isinstance(parent, Parent) or (isinstance(parent, _Group) and not isinstance(parent, group)):
+        raise BadParameter(f"the first argument is a DomainParticipant or a {group.__name__}, not {parent!r}")
+    if not isinstance(topic, Topic):
+        raise BadParameter(f"the second argument is a ddsi.Topic(participant, name, type), not {topic!r}")
+    parent._check_open()
+    topic._check_open()
+    participant = parent.participant
+    participant._running_pump()
+    if topic.participant is not participant:
+        raise PreconditionNotMet(f"{topic!r} was made with {topic.participant!r}; make one with {participant!r}")
+    return participant

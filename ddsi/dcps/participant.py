@@ -6,26 +6,26 @@ socket is left behind.  What the body raises leaves as itself.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable
-from contextlib import AbstractAsyncContextManager
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import trio
 
 from ..config import Config
 from ..config.environment import load_config
 from ..discovery.matching import MatchRefusal
-from ..engine import DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
+from ..engine import DataAvailable, DiscoveryChanged, Effect, LocalWriter, StatusChanged, WriterProgress
 from ..structure.builtin_entity_ids import SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import Qos
+from ..structure.status import SecurityRefused
 from ..transport import Pump, PumpOptions
-from .entity import Entity
+from .entity import Entity, Parent, deadline_scope
+from .lifetime import Lifetime
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
@@ -35,13 +35,16 @@ __all__ = ["DomainParticipant"]
 _HIGHEST_DOMAIN = 232
 _SEDP_READERS = (SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER)
 _LINGER_S = 1.0
+_LINGER_LOOK_S = 0.01
 
 
-class DomainParticipant(Entity):
+class DomainParticipant(Parent):
     """A member of a domain: ``async with DomainParticipant(0) as participant: ...``
 
     Everything created with it is closed with it.
     """
+
+    STATUSES: ClassVar[tuple[type, ...]] = (SecurityRefused,)
 
     def __init__(
         self,
@@ -62,15 +65,17 @@ class DomainParticipant(Entity):
         self._config = config if config is not None else load_config(domain_id)
         self._trace = trace
         self._pump: Pump | None = None
-        self._entities: list[Entity] = []
+        self._lifetime: Lifetime | None = None
         self._by_guid: dict[Guid, Entity] = {}
         self._discovery_lot = trio.lowlevel.ParkingLot()
-        self._manager: AbstractAsyncContextManager[trio.Nursery] | None = None
-        self._nursery: trio.Nursery | None = None
 
     def __repr__(self) -> str:
         state = "closed" if self._is_closed else str(self._pump.engine.guid.prefix) if self._pump else "not entered"
         return f"<DomainParticipant of domain {self._domain_id}, {state}>"
+
+    @property
+    def participant(self) -> DomainParticipant:
+        return self
 
     @property
     def domain_id(self) -> int:
@@ -86,55 +91,59 @@ class DomainParticipant(Entity):
 
     # --- life --------------------------------------------------------------------------------------------
 
+    @trio.lowlevel.enable_ki_protection
     async def __aenter__(self) -> Self:
         self._check_open()
         if self._pump is not None:
-            raise PreconditionNotMet("a DomainParticipant is entered once; make another for another run")
+            raise PreconditionNotMet(f"{self!r} was entered before; a DomainParticipant is entered once, make another")
         await trio.lowlevel.checkpoint()
-        self._pump = Pump(self._options(), self._perform, self._trace)
-        self._manager = trio.open_nursery()
-        self._nursery = await self._manager.__aenter__()
-        await self._pump.run(self._nursery)
+        pump = Pump(self._options(), self._perform, self._trace)
+        self._pump = pump
+        try:
+            pump.start()
+            self._lifetime = Lifetime(pump.run)
+            await self._lifetime.enter()
+        except BaseException:
+            self.close()
+            raise
         return self
 
+    @trio.lowlevel.enable_ki_protection
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        assert self._nursery is not None
-        assert self._manager is not None
+        assert self._lifetime is not None
+        leaving = error
         try:
-            if error is None:
+            if error is None and not self._is_closed:
                 await self._linger()
-        finally:
+        except BaseException as interruption:
+            leaving = interruption
+        try:
             self.close()
-            self._nursery.cancel_scope.cancel()
-            try:
-                await self._manager.__aexit__(None, None, None)
-            except BaseExceptionGroup as group:
-                _raise_what_matters(group, error)
+        except Exception as failure:  # whatever it is, the tasks and sockets are gone
+            leaving = leaving or failure
+        await self._lifetime.leave(leaving)
+        if leaving is not error and leaving is not None:
+            raise leaving
 
     async def _linger(self) -> None:
-        """Reliable samples that are still under way get a moment to arrive."""
+        """Reliable samples that are still under way to other participants get a moment to arrive."""
         pump = self._running_pump()
-        pump.settle()
         with trio.move_on_after(_LINGER_S):
-            for writer in pump.engine.user_writers():
-                behavior = writer.behavior
-                writer.wants_acknowledgment += 1
-                while behavior.is_reliable and behavior.min_acked_sn() < behavior.cache.last_sn:
+            while lagging := [writer for writer in pump.engine.user_writers() if _has_samples_under_way(writer)]:
+                for writer in lagging:
                     pump.engine.request_acknowledgment(writer, pump.now())
-                    pump.settle()
-                    with trio.move_on_after(0.01):
-                        await trio.sleep_forever()
+                pump.settle()
+                await trio.sleep(_LINGER_LOOK_S)
 
     def _on_close(self) -> None:
-        for entity in reversed(self._entities):
-            entity.close()
-        self._discovery_lot.unpark_all()
-        if self._pump is not None:
-            self._pump.close()
-        if self._nursery is not None:
-            self._nursery.cancel_scope.cancel()
+        try:
+            super()._on_close()
+        finally:
+            self._discovery_lot.unpark_all()
+            if self._pump is not None:
+                self._pump.close()
 
     def _options(self) -> PumpOptions:
         properties = self._qos.properties
@@ -183,9 +192,10 @@ class DomainParticipant(Entity):
         return counts
 
     async def wait_for_discovery(self) -> None:
-        """Until the tables of remote participants and endpoints change."""
-        self._check_open()
+        """Until the tables of remote participants and endpoints change.  Raises AlreadyDeleted when they never will."""
+        self._running_pump()
         await self._discovery_lot.park()
+        self._check_open()
 
     def ignore_participant(self, guid: Guid) -> None:
         """Act as if that participant were not there, from now on.  DDS 1.4 §2.2.2.2.1.14."""
@@ -203,19 +213,18 @@ class DomainParticipant(Entity):
 
     def _running_pump(self) -> Pump:
         if self._is_closed:
-            raise AlreadyDeleted("this DomainParticipant was closed before")
+            raise AlreadyDeleted(f"{self!r}: what was asked needs a participant that is open; make another")
         if self._pump is None:
-            raise PreconditionNotMet("enter the participant first: async with DomainParticipant(...) as participant")
+            raise PreconditionNotMet(
+                f"{self!r}: enter it first, by `async with DomainParticipant(...) as participant:`"
+            )
         return self._pump
 
     def _when_running(self, action: Callable[[Pump], None]) -> None:
         """At an entity's end: act on the engine unless it is gone already."""
-        if self._pump is not None:
+        if self._pump is not None and not self._pump.is_closed:
             action(self._pump)
             self._pump.settle()
-
-    def _adopt(self, entity: Entity) -> None:
-        self._entities.append(entity)
 
     def _register(self, guid: Guid, entity: Entity) -> None:
         self._by_guid[guid] = entity
@@ -250,9 +259,10 @@ class DomainParticipant(Entity):
     ) -> None:
         """Until ``holds``, looked at whenever the entity may have changed.  Raises DdsTimeout saying ``otherwise``."""
         entity._check_open()
+        scope = deadline_scope(timeout)
         self._running_pump().before_waiting()
         await trio.lowlevel.checkpoint()
-        with trio.fail_after(math.inf) if timeout is None else trio.move_on_after(timeout):
+        with scope:
             while not holds():
                 await entity._changed.park()
                 entity._check_open()
@@ -260,15 +270,9 @@ class DomainParticipant(Entity):
         raise DdsTimeout(f"{otherwise} after {timeout} s; `ddsi ls` shows who is there")
 
 
-def _raise_what_matters(group: BaseExceptionGroup[BaseException], body_error: BaseException | None) -> None:
-    """Out of what the tasks left: their own failure, unwrapped; cancellation only if nothing else is on its way."""
-    _, failures = group.split(trio.Cancelled)
-    leaf: BaseException = failures if failures is not None else group
-    while isinstance(leaf, BaseExceptionGroup) and len(leaf.exceptions) == 1:
-        leaf = leaf.exceptions[0]
-    if failures is None:
-        if body_error is not None:
-            return
-        while isinstance(leaf, BaseExceptionGroup):
-            leaf = leaf.exceptions[0]
-    raise leaf from None
+def _has_samples_under_way(writer: LocalWriter) -> bool:
+    behavior = writer.behavior
+    last_sn = behavior.cache.last_sn
+    return behavior.is_reliable and any(
+        proxy.is_reliable and proxy.acked_sn < last_sn for proxy in behavior.readers.values()
+    )

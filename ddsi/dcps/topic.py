@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from ..structure.errors import BadParameter
 from ..structure.qos import Qos
+from ..structure.status import InconsistentTopic
 from ..xtypes.type_support import TypeSupport, type_support
 from .entity import Entity
 
@@ -21,15 +22,18 @@ _MAX_NAME_OCTETS = 255
 class Topic(Entity, Generic[T]):
     """What writers and readers agree on: the topic's name and the type of its samples.
 
-    ``qos`` serves the topic's writers and readers wherever they do not set a policy themselves.
+    ``qos`` serves the topic's writers and readers wherever they do not set a policy themselves.  Closing a topic does
+    not close them; it only makes no more.
     """
+
+    STATUSES: ClassVar[tuple[type, ...]] = (InconsistentTopic,)
 
     def __init__(self, participant: DomainParticipant, name: str, type_: type[T], qos: Qos | None = None) -> None:
         """``name``: 1 to 255 octets of UTF-8.  Raises BadParameter, also when ``type_`` cannot be a topic's type."""
         super().__init__(qos)
         if not isinstance(name, str) or not 1 <= len(name.encode()) <= _MAX_NAME_OCTETS or "\0" in name:
             raise BadParameter(f"a topic's name is a str of 1 to 255 octets without NUL, not {name!r}")
-        participant._check_open()
+        participant._running_pump()
         self._participant = participant
         self._name = name
         self._type = type_
@@ -55,6 +59,16 @@ class Topic(Entity, Generic[T]):
     @property
     def type_support(self) -> TypeSupport[T]:
         return self._type_support
+
+    def _found_inconsistent(self, remote_type_name: str) -> None:
+        """One of its writers or readers met a peer that uses the name with another type."""
+        total_count = self.status(InconsistentTopic).total_count + 1
+        self._status_changed(
+            InconsistentTopic(total_count=total_count, total_count_change=1, remote_type_name=remote_type_name)
+        )
+
+    def _on_close(self) -> None:
+        self._participant._disown(self)
 
     def __repr__(self) -> str:
         return f"<Topic {self._name!r} of {self.type_name}>"

@@ -54,7 +54,7 @@ class PumpOptions:
 
 
 class Pump:
-    """Opened by the constructor (sockets and engine), driven by :meth:`run`.
+    """Opened by the constructor (sockets and engine), set going by :meth:`start`, driven by the task :meth:`run`.
 
     ``on_effect`` takes every effect that is not about the network: data, statuses, progress.
     """
@@ -86,7 +86,10 @@ class Pump:
         self._backlog: deque[tuple[SendDatagram, Locator]] = deque()
         self._backlog_waiting = trio.lowlevel.ParkingLot()
         self.dropped_at_send = 0
+        self.is_closed = False
+        self._running = trio.CancelScope()
         self._nursery: trio.Nursery | None = None
+        self._jobs: list[Compute] = []
         self._limiter = trio.CapacityLimiter(_COMPUTE_THREADS)
         self._operations = 0
         self._last_yield = -math.inf
@@ -121,28 +124,44 @@ class Pump:
 
     # --- running -----------------------------------------------------------------------------------------
 
-    async def run(self, nursery: trio.Nursery) -> None:
-        """Start all tasks in ``nursery`` and begin to announce."""
-        self._nursery = nursery
-        for sock in self.transport.sockets():
-            nursery.start_soon(self._receive, sock, name="ddsi receive")
-        nursery.start_soon(self._keep_time, name="ddsi timer")
-        nursery.start_soon(self._flush_when_idle, name="ddsi flush")
-        nursery.start_soon(self._send_backlog, name="ddsi send")
+    def start(self) -> None:
+        """Begin to announce; what the network answers is read when :meth:`run` runs."""
         self.engine.start(self.now())
         self.settle()
 
+    async def run(self) -> None:
+        """Read, keep time and send until :meth:`close`, which ends this at once."""
+        with self._running:
+            async with trio.open_nursery() as nursery:
+                self._nursery = nursery
+                for sock in self.transport.sockets():
+                    nursery.start_soon(self._receive, sock, name="ddsi receive")
+                nursery.start_soon(self._keep_time, name="ddsi timer")
+                nursery.start_soon(self._flush_when_idle, name="ddsi flush")
+                nursery.start_soon(self._send_backlog, name="ddsi send")
+                while self._jobs:
+                    nursery.start_soon(self._compute, self._jobs.pop(0))
+
     def close(self) -> None:
         """Say goodbye and close everything.  Safe twice."""
-        self.engine.close(self.now())
-        self.settle()
-        self._files.close()
+        if self.is_closed:
+            return
+        try:
+            self.engine.close(self.now())
+            self.settle()
+            self._send_backlog_now()
+        finally:
+            self.is_closed = True
+            # In this order: no task may wait for a socket that is closed, or for another one that gets its number.
+            self._running.cancel()
+            self._files.close()
 
+    @trio.lowlevel.enable_ki_protection
     async def _receive(self, sock: socket.socket) -> None:
         buffer = bytearray(65536)
         view = memoryview(buffer)
         engine, locator_of = self.engine, self.transport.locator_of
-        while True:
+        while not self.is_closed:
             await trio.lowlevel.wait_readable(sock)
             now = trio.current_time()
             for _ in range(_BATCH):
@@ -150,11 +169,14 @@ class Pump:
                     octets, address = sock.recvfrom_into(buffer)
                 except BlockingIOError:
                     break
-                except OSError:  # an ICMP error for something sent before; it is not about this socket
-                    continue
+                except OSError:
+                    if self.is_closed:  # since this task was woken
+                        return
+                    continue  # an ICMP error for something sent before; it is not about this socket
                 engine.receive_datagram(view[:octets], locator_of(address), now)
             self.settle()
 
+    @trio.lowlevel.enable_ki_protection
     async def _keep_time(self) -> None:
         """Call the engine when its earliest timer is due; others move that deadline by :meth:`_rearm`."""
         while True:
@@ -165,32 +187,40 @@ class Pump:
                 self.engine.handle_timeout(now)
                 self.settle()
 
+    @trio.lowlevel.enable_ki_protection
     async def _flush_when_idle(self) -> None:
         """Woken by the first write of a burst; runs when the writing task yields."""
         while True:
             await self._flusher.park()
             self.settle()
 
+    @trio.lowlevel.enable_ki_protection
     async def _send_backlog(self) -> None:
         """What the system's buffer did not take at once, in order, when it does."""
-        while True:
-            await self._backlog_waiting.park()
-            while self._backlog:
-                await trio.lowlevel.wait_writable(self.transport.unicast[0])
-                while self._backlog and self.transport.send(self._backlog[0][0].parts, self._backlog[0][1]):
-                    self._backlog.popleft()
+        while not self.is_closed:
+            if self._backlog:
+                await trio.lowlevel.wait_writable(self.transport.blocked or self.transport.unicast[0])
+                self._send_backlog_now()
+            else:
+                await self._backlog_waiting.park()
+
+    def _send_backlog_now(self) -> None:
+        backlog = self._backlog
+        while backlog and self.transport.send(backlog[0][0].parts, backlog[0][1]):
+            backlog.popleft()
 
     # --- effects -----------------------------------------------------------------------------------------
 
     def settle(self) -> None:
         """Act on everything the engine has asked for, flush what it has queued, and re-arm the timer."""
+        if self.is_closed:
+            return
         self._flush_wanted = False
         for effect in self.engine.drain_effects():
             if isinstance(effect, SendDatagram):
                 self._send(effect)
             elif isinstance(effect, Compute):
-                assert self._nursery is not None
-                self._nursery.start_soon(self._compute, effect)
+                self._start_job(effect)
             else:
                 self._on_effect(effect)
         self._rearm()
@@ -233,6 +263,13 @@ class Pump:
                 self._backlog.append((replace(effect, parts=[b"".join(effect.parts)]), locator))
                 self._backlog_waiting.unpark_all()
 
+    def _start_job(self, effect: Compute) -> None:
+        if self._nursery is None:  # before `run` was scheduled for the first time
+            self._jobs.append(effect)
+        else:
+            self._nursery.start_soon(self._compute, effect)
+
+    @trio.lowlevel.enable_ki_protection
     async def _compute(self, effect: Compute) -> None:
         result = await trio.to_thread.run_sync(effect.job, limiter=self._limiter, abandon_on_cancel=True)
         effect.computed(result, self.now())

@@ -48,6 +48,7 @@ class UdpTransport:
         self._domain_id = domain_id
         self.unicast: list[socket.socket] = []
         self.multicast: socket.socket | None = None
+        self.blocked: socket.socket | None = None  # whose buffer was full at the last :meth:`send` that failed
         self.participant_index: int | None = None
         self._by_locator: dict[Locator, tuple[tuple[str, int], Sequence[socket.socket]]] = {}
         self._locators: dict[tuple[str, int], Locator] = {}
@@ -212,6 +213,7 @@ class UdpTransport:
                 else:
                     sock.sendmsg(parts, (), 0, address)
             except BlockingIOError:
+                self.blocked = sock
                 return False
             except OSError:
                 continue
