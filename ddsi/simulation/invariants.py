@@ -129,9 +129,15 @@ def _gaps(writer: NodeWriter, reader: NodeReader) -> Iterator[str]:
     if foreign:
         yield f"{_pair(writer, reader)}: {_some(foreign)} came, which were for others"
     early = [number for number in session if number <= proxy.history_sn]
-    # Where the writer lost the reader for a while and the reader never noticed, its session began earlier.
-    if early and not writer.local.data.qos.is_transient_local and _match_count(writer, reader) == 1:
+    if early and not writer.local.data.qos.is_transient_local and not _may_be_early(writer, reader):
         yield f"{_pair(writer, reader)}: {_some(early)} came, which were written before the match"
+
+
+def _may_be_early(writer: NodeWriter, reader: NodeReader) -> bool:
+    """Samples to other readers of the participant may have been under way when the pair matched.  And where the writer
+    lost the reader for a while and the reader never noticed, its session began earlier."""
+    has_neighbour = any(other is not reader and writer.guid in other.sessions for other in reader.node.readers)
+    return has_neighbour or _match_count(writer, reader) > 1
 
 
 def _match_count(writer: NodeWriter, reader: NodeReader) -> int:

@@ -321,15 +321,20 @@ class _Run:
             writer.write()
         # It takes a moment until those who lack something know it.
         domain.run(1.0)
-        if not domain.run_until(lambda: invariants.is_at_rest(domain), _REST_S):
+        if not domain.run_until(self._is_at_rest, _REST_S):
             self._check(f"{_REST_S} s later", ["not at rest", *invariants.at_rest(domain)])
+
+    def _is_at_rest(self) -> bool:
+        # In bad weather a lease may just have run out; then the two will find each other again.
+        domain = self._domain
+        return invariants.is_at_rest(domain) and domain.are_introduced() and domain.all_matched()
 
     def _clear_up(self) -> None:
         """Good weather from here on: where announcements get lost, a lease may run out at any time."""
         domain = self._domain
         domain.network.conditions = GOOD_WEATHER
         domain.run(5.0)
-        domain.run_until(lambda: domain.all_matched() and invariants.is_at_rest(domain), _INTRODUCTION_S)
+        domain.run_until(self._is_at_rest, _INTRODUCTION_S)
 
     def _check(self, when: str, flaws: list[str]) -> None:
         if flaws:
