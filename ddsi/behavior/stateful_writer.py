@@ -179,7 +179,7 @@ class StatefulWriter:
         self, data: DiscoveredReaderData, locators: tuple[Locator, ...], now: float
     ) -> list[WriterTransmission]:
         """RTPS 2.5 §8.4.7.3.1.  A reliable reader is told at once what there is, lest it waits or asks."""
-        proxy = ReaderProxy(data, locators, history_sn=self._history_sn_for(data), now=now)
+        proxy = ReaderProxy(data, locators, history_sn=self._history_sn_for(data, self.next_unsent_sn - 1), now=now)
         proxy.match_sn = self.next_unsent_sn - 1
         self.readers[data.guid] = proxy
         self._matched_readers_changed()
@@ -191,7 +191,7 @@ class StatefulWriter:
 
     def matched_local_reader_add(self, data: DiscoveredReaderData, now: float) -> ReaderProxy:
         """A reader of the same participant: it is handed the changes themselves."""
-        proxy = ReaderProxy(data, (), history_sn=self._history_sn_for(data), now=now)
+        proxy = ReaderProxy(data, (), history_sn=self._history_sn_for(data, self.cache.last_sn), now=now)
         self.local_readers[data.guid] = proxy
         return proxy
 
@@ -507,10 +507,13 @@ class StatefulWriter:
             if change.destination in (proxy.guid, proxy.participant_guid):
                 self.cache.remove(change.sequence_number)
 
-    def _history_sn_for(self, data: DiscoveredReaderData) -> int:
-        """The highest number that a reader matched now must not get: all so far, unless both sides keep history."""
+    def _history_sn_for(self, data: DiscoveredReaderData, sent_sn: int) -> int:
+        """The highest number that a reader matched now must not get: all sent so far, unless both sides keep history.
+
+        What was written but waits for the window will be sent to this reader with the others, so it may ask for it too.
+        """
         wants_history = data.qos.is_transient_local and data.qos.is_reliable and self.qos.is_transient_local
-        return 0 if wants_history else self.cache.last_sn
+        return 0 if wants_history else sent_sn
 
     def _matched_readers_changed(self) -> None:
         self._reliable_readers = sum(proxy.is_reliable for proxy in self.readers.values()) if self.is_reliable else 0

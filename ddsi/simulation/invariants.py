@@ -134,9 +134,10 @@ def _gaps(writer: NodeWriter, reader: NodeReader) -> Iterator[str]:
 
 
 def _may_be_early(writer: NodeWriter, reader: NodeReader) -> bool:
-    """Samples to other readers of the participant may have been under way when the pair matched.  And where the writer
-    lost the reader for a while and the reader never noticed, its session began earlier."""
-    has_neighbour = any(other is not reader and writer.guid in other.sessions for other in reader.node.readers)
+    """Samples to another reader at the same address, of this participant or one that was there before, may have been
+    under way when the pair matched.  And where the writer lost the reader for a while and the reader never noticed, its
+    session began earlier."""
+    has_neighbour = any(other is not reader and other.topic == writer.topic for other in reader.node.readers)
     return has_neighbour or _match_count(writer, reader) > 1
 
 
