@@ -138,9 +138,8 @@ def _count(type_: SequenceType | ArrayType, value: Any, path: str) -> int:
         raise BadParameter(f"{path}: {_shown(value)} is no sequence of {type_.element}")
     if isinstance(value, str) and not characters:
         raise BadParameter(f"{path}: {_shown(value)} is a string, not a sequence of {type_.element}")
-    if isinstance(type_.element, Primitive) and type_.element.is_octet and _is_buffer(value):
-        return memoryview(value).nbytes
-    return len(value)
+    octets_expected = isinstance(type_.element, Primitive) and type_.element.is_octet
+    return _number_of_elements(value) if octets_expected else len(value)
 
 
 def _check_elements(element: IdlType, value: Any, path: str, depth: int) -> None:
