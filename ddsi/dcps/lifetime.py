@@ -46,13 +46,11 @@ class Lifetime:
         try:
             if await self._manager.__aexit__(kind, error, traceback):
                 leaving = None  # a cancellation that was the nursery's own
-        except BaseExceptionGroup as group:
-            # What is not the body's error itself is the part of it that was no cancellation, or a KeyboardInterrupt
-            # that came while we waited.
-            leaving = next((member for member in group.exceptions if member is not error), error)
+        except BaseExceptionGroup as wrapped:
+            leaving = _unwrapped(wrapped, error)
         failure = self._failure
         if failure is not None:
-            if leaving is None or _is_cancellation(leaving):
+            if leaving is None or isinstance(leaving, trio.Cancelled):
                 raise failure from failure.__cause__
             leaving.add_note(f"Meanwhile the participant's own task failed: {failure!r}")
         if leaving is not None and leaving is not error:
@@ -60,20 +58,24 @@ class Lifetime:
 
     @trio.lowlevel.enable_ki_protection
     async def _in_background(self) -> None:
-        try:
-            await self._run()
-        except BaseException as failure:
-            if _is_cancellation(failure):
-                raise
-            assert self._nursery is not None
-            self._failure = _innermost(failure)
-            self._nursery.cancel_scope.cancel()
+        # Shielded: a body that is cancelled may still have something to say while it cleans up.
+        with trio.CancelScope(shield=True):
+            try:
+                await self._run()
+            except BaseException as failure:
+                assert self._nursery is not None
+                self._failure = _innermost(failure)
+                self._nursery.cancel_scope.cancel()
 
 
-def _is_cancellation(error: BaseException) -> bool:
-    if isinstance(error, BaseExceptionGroup):
-        return error.split(trio.Cancelled)[1] is None
-    return isinstance(error, trio.Cancelled)
+def _unwrapped(wrapped: BaseExceptionGroup[BaseException], error: BaseException | None) -> BaseException | None:
+    """What the nursery has wrapped: the body's error, without cancellations if they were the nursery's own."""
+    interrupts = [member for member in wrapped.exceptions if isinstance(member, KeyboardInterrupt)]
+    if interrupts:  # it may have come while we waited
+        return interrupts[0]
+    if not isinstance(error, BaseExceptionGroup) or error.split(trio.Cancelled)[0] is None:
+        return error
+    return error if wrapped.split(trio.Cancelled)[0] is not None else wrapped.exceptions[0]
 
 
 def _innermost(failure: BaseException) -> BaseException:
