@@ -16,6 +16,7 @@ from ..peers.peer import Peer
 __all__ = ["Cast", "Story", "deliver", "deliver_late", "deliver_some", "refuse", "say_goodbye"]
 
 STEP_TIMEOUT = 20.0
+"""Seconds for a step on a quiet host; a step also gets what the programs' own option ``-w`` gives them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,10 @@ class Cast:
     subscriber: Peer
     publisher_options: Options
     subscriber_options: Options
+
+    @property
+    def patience(self) -> float:
+        return max(STEP_TIMEOUT, self.publisher_options.wait_s + 2, self.subscriber_options.wait_s + 2)
 
     async def start_publisher(self) -> Process:
         here, there = self.publisher_host, self.subscriber_host
@@ -47,8 +52,8 @@ async def deliver(cast: Cast) -> None:
     subscriber = await cast.start_subscriber()
     publisher = await cast.start_publisher()
     await _open_gate(cast, publisher, subscriber)
-    await publisher.expect("HOLDING", timeout=STEP_TIMEOUT)
-    await subscriber.expect("HOLDING", timeout=STEP_TIMEOUT)
+    await publisher.expect("HOLDING", timeout=cast.patience)
+    await subscriber.expect("HOLDING", timeout=cast.patience)
     _check_acknowledged(cast, publisher)
     _check_gone(cast, publisher, subscriber)
     await _dismiss(publisher)
@@ -61,8 +66,8 @@ async def deliver_some(cast: Cast) -> None:
     subscriber = await cast.start_subscriber()
     publisher = await cast.start_publisher()
     await _open_gate(cast, publisher, subscriber)
-    await subscriber.expect("HOLDING", timeout=STEP_TIMEOUT)
-    await publisher.expect("HOLDING", timeout=STEP_TIMEOUT)
+    await subscriber.expect("HOLDING", timeout=cast.patience)
+    await publisher.expect("HOLDING", timeout=cast.patience)
     await _dismiss(publisher)
     await _dismiss(subscriber)
     written = iter([match[1] for match in publisher.matches("WROTE (.*)")])
@@ -74,9 +79,9 @@ async def deliver_some(cast: Cast) -> None:
 async def deliver_late(cast: Cast) -> None:
     """A subscriber that comes after the last write gets what the publisher's history keeps."""
     publisher = await cast.start_publisher()
-    await publisher.expect("HOLDING", timeout=STEP_TIMEOUT)
+    await publisher.expect("HOLDING", timeout=cast.patience)
     subscriber = await cast.start_subscriber()
-    await subscriber.expect("HOLDING", timeout=STEP_TIMEOUT)
+    await subscriber.expect("HOLDING", timeout=cast.patience)
     await _dismiss(subscriber)
     await _dismiss(publisher)
     written = [match[1] for match in publisher.matches("WROTE (.*)")]
@@ -87,8 +92,8 @@ async def say_goodbye(cast: Cast) -> None:
     """A publisher that leaves is gone at once for the subscriber: it says so, no lease has to run out."""
     subscriber = await cast.start_subscriber()
     publisher = await cast.start_publisher()
-    await publisher.expect("HOLDING", timeout=STEP_TIMEOUT)
-    await subscriber.expect("HOLDING", timeout=STEP_TIMEOUT)
+    await publisher.expect("HOLDING", timeout=cast.patience)
+    await subscriber.expect("HOLDING", timeout=cast.patience)
     await _dismiss(publisher)
     await subscriber.expect("MATCHED 0", timeout=3)
     await _dismiss(subscriber)
@@ -98,8 +103,8 @@ async def refuse(cast: Cast) -> None:
     """Two that do not fit never match, and nothing is delivered."""
     subscriber = await cast.start_subscriber()
     publisher = await cast.start_publisher()
-    await publisher.expect("TIMEOUT 0 .*", timeout=STEP_TIMEOUT)
-    await subscriber.expect("TIMEOUT 0 .*", timeout=STEP_TIMEOUT)
+    await publisher.expect("TIMEOUT 0 .*", timeout=cast.patience)
+    await subscriber.expect("TIMEOUT 0 .*", timeout=cast.patience)
     if subscriber.matches("MATCHED .*"):
         raise ExpectationFailed("the subscriber matched")
 
@@ -110,8 +115,8 @@ async def refuse(cast: Cast) -> None:
 async def _open_gate(cast: Cast, publisher: Process, subscriber: Process) -> None:
     """Where nothing is kept for late joiners, writing begins when each side has found the other."""
     if cast.publisher_options.gate:
-        await publisher.expect("MATCHED 1", timeout=STEP_TIMEOUT)
-        await subscriber.expect("MATCHED 1", timeout=STEP_TIMEOUT)
+        await publisher.expect("MATCHED 1", timeout=cast.patience)
+        await subscriber.expect("MATCHED 1", timeout=cast.patience)
         await publisher.send("write")
 
 

@@ -205,7 +205,7 @@ static int publish(dds_entity_t participant, dds_entity_t topic)
     say_key("UNREGISTERED", &s);
   }
   if (!o.best_effort)
-    say(dds_wait_for_acks(writer, DDS_SECS(5)) == 0 ? "ACKED" : "NOT-ACKED");
+    say(dds_wait_for_acks(writer, DDS_SECS(o.wait_s)) == 0 ? "ACKED" : "NOT-ACKED");
   leave_slowly(&o);
   say("DONE %d", o.count);
   return 0;

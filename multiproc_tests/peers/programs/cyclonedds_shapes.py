@@ -156,7 +156,7 @@ def publish(o: Arguments, participant: DomainParticipant, topic: Topic[Any]) -> 
         writer.unregister_instance(sample)
         say("UNREGISTERED", key_of(sample))
     if not o.best_effort:
-        say("ACKED" if writer.wait_for_acks(duration(seconds=5)) else "NOT-ACKED")
+        say("ACKED" if writer.wait_for_acks(duration(seconds=o.wait_s)) else "NOT-ACKED")
     leave_slowly(o)
     say("DONE", o.count)
     return 0

@@ -132,7 +132,7 @@ async def publish(o: Arguments, participant: ddsi.DomainParticipant, topic: Any)
         say("UNREGISTERED", key_of(sample))
     if not o.best_effort:
         try:
-            await writer.wait_for_acknowledgments(5)
+            await writer.wait_for_acknowledgments(o.wait_s)
             say("ACKED")
         except ddsi.DdsTimeout:
             say("NOT-ACKED")

@@ -70,7 +70,7 @@ def publish(o: Arguments, participant: Any, topic: Any) -> int:
         time.sleep(o.interval_ms / 1000)
     if not o.best_effort:
         try:
-            writer.wait_for_acknowledgments(dust.Duration(5, 0))
+            writer.wait_for_acknowledgments(dust.Duration(int(o.wait_s), 0))
             say("ACKED")
         except Exception as error:
             say("NOT-ACKED", error)

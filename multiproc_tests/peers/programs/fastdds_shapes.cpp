@@ -218,7 +218,7 @@ static int publish(DomainParticipant* participant, Topic* topic)
     }
     if (!o.best_effort)
     {
-        say(writer->wait_for_acknowledgments({5, 0}) == ReturnCode_t::RETCODE_OK ? "ACKED" : "NOT-ACKED");
+        say(writer->wait_for_acknowledgments({o.wait_s, 0}) == ReturnCode_t::RETCODE_OK ? "ACKED" : "NOT-ACKED");
     }
     leave_slowly(&o);
     say("DONE %d", o.count);
