@@ -57,6 +57,7 @@ class LocalWriter:
         "behavior",
         "data",
         "guid",
+        "has_fresh_samples",
         "incompatible",
         "liveliness",
         "matched",
@@ -72,6 +73,7 @@ class LocalWriter:
         self.guid: Guid = data.guid
         self.behavior = behavior
         self.packer = packer
+        self.has_fresh_samples = False  # were any packed since the last piggybacked HEARTBEAT?
         self.protection = ProtectedEndpoint()
         self.receivers: tuple[Guid, ...] = ()
         self.matched = PublicationMatched()

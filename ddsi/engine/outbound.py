@@ -167,15 +167,16 @@ class Outbound:
             self._append_directed(writer.guid, reader.guid, reader.locators, parts, ticks)
 
     def _append_to_group(self, writer: LocalWriter, parts: Parts, ticks: int | None) -> None:
+        """``ticks``: the sample's timestamp; None for what is no sample."""
         packer = writer.packer
         size = sum(map(len, parts))
         if not packer.fits(size + 12):
             self._emit_group(writer)
-        elif writer.guid not in self._dirty_writers:
-            self._dirty_writers[writer.guid] = writer
-        if ticks is not None and ticks != packer.timestamp:
-            packer.add((fast.timestamp(ticks),), 12)
-            packer.timestamp = ticks
+        if ticks is not None:
+            writer.has_fresh_samples = True
+            if ticks != packer.timestamp:
+                packer.add((fast.timestamp(ticks),), 12)
+                packer.timestamp = ticks
         packer.add(parts, size)
         self._dirty_writers[writer.guid] = writer
 
@@ -222,9 +223,8 @@ class Outbound:
         """Close every open message.  A HEARTBEAT rides behind the samples of each reliable writer."""
         if self._dirty_writers:
             for writer in list(self._dirty_writers.values()):
-                heartbeat = writer.behavior.piggyback_heartbeat()
-                if heartbeat is not None:
-                    self._piggyback(writer, heartbeat)
+                if writer.has_fresh_samples:
+                    self._piggyback(writer)
                 self._emit_group(writer)
             self._dirty_writers.clear()
         if self._directed:
@@ -232,7 +232,12 @@ class Outbound:
             for (_, _, locators), (packer, receiver) in directed.items():
                 self._emit_message(packer, (receiver,), locators)
 
-    def _piggyback(self, writer: LocalWriter, item: SendHeartbeat) -> None:
+    def _piggyback(self, writer: LocalWriter) -> None:
+        """Only behind samples: a final HEARTBEAT right behind one that asks would take the question back (Fast DDS)."""
+        writer.has_fresh_samples = False
+        item = writer.behavior.piggyback_heartbeat()
+        if item is None:
+            return
         octets = fast.heartbeat(_UNKNOWN_ID, writer.guid[12:], item.first, item.last, item.count, final=item.final)
         parts = self._hooks.encode_submessage(writer.guid, writer.receivers, (octets,))
         size = sum(map(len, parts))

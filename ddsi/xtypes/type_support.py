@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from contextlib import suppress
+from typing import Any, Generic, Literal, TypeVar
 
 from ..structure.errors import BadParameter, MalformedSample
 from ..structure.qos_policies import DataRepresentationId
@@ -34,6 +35,7 @@ XCDR1, XCDR2 = DataRepresentationId.XCDR1, DataRepresentationId.XCDR2
 _CANONICAL = Encoding(XCDR2, little_endian=False)
 _CANONICAL_HEADER = _CANONICAL.encapsulation_id(Extensibility.FINAL) + bytes(2)
 
+_DELIMITED = (b"\x00\x08", b"\x00\x09")  # D_CDR2, big and little endian
 _VIEW_FROM = 4096
 """A memoryview of fewer octets is copied first: bytes are read faster."""
 
@@ -134,7 +136,7 @@ class TypeSupport(Generic[T]):
         """A sample with the key of a key-only payload, and the type's defaults elsewhere.  MalformedSample."""
         if self._key_struct is None:
             raise MalformedSample(f"{self.type_name}: a key, for a type that has none")
-        sample: T = self._read_key_payload(octets)
+        sample: T = self._read_key(octets)
         return sample
 
     def sample_from_key(self, key: bytes) -> T:
@@ -148,7 +150,21 @@ class TypeSupport(Generic[T]):
         """The canonical key in a key-only payload.  Raises MalformedSample."""
         if self._key_struct is None:
             return b""
-        return self._key_of(self._read_key_payload(octets))
+        return self._key_of(self._read_key(octets))
+
+    def _read_key(self, octets: Octets) -> Any:
+        """The key of an appendable type in XCDR2 comes with its DHEADER, but Cyclone DDS 0.10 leaves that out.
+
+        So one that does not announce what follows it is no DHEADER, nor is one behind which nothing fits the type.
+        """
+        if bytes(octets[:2]) not in _DELIMITED or len(octets) < 8:
+            return self._read_key_payload(octets)
+        byteorder: Literal["little", "big"] = "little" if octets[1] & 1 else "big"
+        beyond = len(octets) - 8 - int.from_bytes(octets[4:8], byteorder)
+        if 0 <= beyond <= 3:  # what is beyond it can be padding
+            with suppress(MalformedSample):
+                return self._read_key_payload(octets)
+        return self._read_canonical(bytes((0, octets[1] - 2)) + bytes(octets[2:]))
 
     def key_hash(self, key: bytes, representation: DataRepresentationId) -> bytes:
         """The 16 octets of the key hash that a writer with this representation gives (RTPS 2.5 §9.6.4.8).
