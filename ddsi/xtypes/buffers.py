@@ -175,7 +175,8 @@ def flatten(value: Any, dimensions: tuple[int, ...]) -> Any:
     Raises ValueError unless each level has its dimension.  A buffer, or a flat sequence of all the elements,
     is taken as it is when its size fits.
     """
-    _sequence(value)
+    if value.__class__ is not str:  # characters may come as a string
+        _sequence(value)
     if len(dimensions) == 1:
         if len(value) != dimensions[0]:
             raise ValueError(f"{len(value)} elements where the array has {dimensions[0]}")

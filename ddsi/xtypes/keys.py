@@ -24,7 +24,14 @@ from .model import (
     reachable_structs,
 )
 
-__all__ = ["KEY_HASH_OCTETS", "alignments_differ", "canonical_key_type", "hash_is_digest", "key_type"]
+__all__ = [
+    "KEY_HASH_OCTETS",
+    "alignments_differ",
+    "canonical_key_type",
+    "hash_is_digest",
+    "key_type",
+    "undelimited_key_type",
+]
 
 KEY_HASH_OCTETS = 16
 
@@ -34,14 +41,20 @@ def key_type(struct: StructType) -> StructType | None:
     return _Projection(canonical=False).top(struct)
 
 
+def undelimited_key_type(struct: StructType) -> StructType | None:
+    """The key type as if it were final, in declaration order, as Cyclone DDS 0.10 writes key-only payloads."""
+    return _Projection(canonical=False, final=True).top(struct)
+
+
 def canonical_key_type(struct: StructType) -> StructType | None:
     """The final type, ordered by member id, whose octets identify an instance; None if there is no key."""
     return _Projection(canonical=True).top(struct)
 
 
 class _Projection:
-    def __init__(self, *, canonical: bool) -> None:
+    def __init__(self, *, canonical: bool, final: bool = False) -> None:
         self._canonical = canonical
+        self._final = final or canonical
         self._done: dict[int, StructType] = {}
 
     def top(self, struct: StructType) -> StructType | None:
@@ -54,7 +67,7 @@ class _Projection:
             self._done[id(struct)] = StructType(
                 struct.python_class,
                 struct.type_name,
-                Extensibility.FINAL if self._canonical else struct.extensibility,
+                Extensibility.FINAL if self._final else struct.extensibility,
                 lambda: tuple(self._member(member) for member in chosen),
                 omitted=tuple(member for member in struct.members if member not in keys),
             )

@@ -17,7 +17,7 @@ from ..structure.qos_policies import DataRepresentationId
 from .careful_reader import read_carefully
 from .definition import struct_type
 from .key_source import generate_key_extractor
-from .keys import KEY_HASH_OCTETS, alignments_differ, canonical_key_type, hash_is_digest, key_type
+from .keys import KEY_HASH_OCTETS, alignments_differ, canonical_key_type, hash_is_digest, key_type, undelimited_key_type
 from .layout import Encoding, encapsulations
 from .model import ArrayType, Extensibility, IdlType, SequenceType, StructType, reachable_structs
 from .read_source import generate_reader
@@ -91,6 +91,7 @@ class TypeSupport(Generic[T]):
             return
         self._key_struct, self._canonical = key, canonical
         self._read_key_payload = self._reader(key)
+        self._read_undelimited_key = self._reader(undelimited_key_type(struct) or key)
         self._read_canonical = self._reader(canonical)
         self.key = self._writer(canonical, _CANONICAL, header=False)
         self.key_from_payload = self._key_extractor(struct, canonical)
@@ -164,7 +165,7 @@ class TypeSupport(Generic[T]):
         if 0 <= beyond <= 3:  # what is beyond it can be padding
             with suppress(MalformedSample):
                 return self._read_key_payload(octets)
-        return self._read_canonical(bytes((0, octets[1] - 2)) + bytes(octets[2:]))
+        return self._read_undelimited_key(bytes((0, octets[1] - 2)) + bytes(octets[2:]))
 
     def key_hash(self, key: bytes, representation: DataRepresentationId) -> bytes:
         """The 16 octets of the key hash that a writer with this representation gives (RTPS 2.5 §9.6.4.8).

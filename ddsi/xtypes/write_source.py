@@ -4,51 +4,25 @@ DDS-XTypes 1.3 §7.4.  The generated function takes a sample and returns its oct
 unfit value makes Python raise (``value_check.py`` then finds the member and says it properly), and for what
 :mod:`struct` does not check, such as bounds, ``ValueError``.  Nested structs are written in line; recursive ones
 have a function of their own.
+
+Here are structs and their members; ``write_values.py`` has the rest.
 """
 
 from __future__ import annotations
 
-import enum
-import struct
 from array import array
 from collections.abc import Callable
 from typing import Any
 
 from . import buffers
-from .buffers import needs_swap
-from .layout import (
-    ALIGNED,
-    UNKNOWN,
-    Encoding,
-    Residue,
-    after,
-    emheader_length_code,
-    has_dheader,
-    static_size,
-)
-from .model import (
-    BOOLEAN,
-    CHAR,
-    WCHAR,
-    ArrayType,
-    BitmaskType,
-    EnumType,
-    Extensibility,
-    IdlType,
-    Member,
-    Primitive,
-    SequenceType,
-    String,
-    StructType,
-)
+from .layout import ALIGNED, UNKNOWN, Encoding, emheader_length_code, static_size
+from .model import Extensibility, Member, StructType
 from .recursion import FunctionPlan
 from .source import Source
 from .write_emitter import Position, WriteEmitter
+from .write_values import ValueWriter, enum_values, pack_numbers
 
 __all__ = ["generate_writer"]
-
-_IN_RUN = 64
-"""Arrays of primitives up to so many octets are copied into a run; larger ones go as buffers of their own."""
 
 PID_EXTENDED_MUST_UNDERSTAND = 0x7F01
 """PID_EXTENDED with the must-understand flag, as Cyclone DDS writes it for every parameter (§7.4.1.2)."""
@@ -82,24 +56,8 @@ _RUNTIME = (
 )
 
 
-def enum_values(values: Any, python_class: type[enum.IntEnum]) -> list[int]:
-    """The numbers of enum literals; ValueError for what is none."""
-    return [item._value_ if item.__class__ is python_class else python_class(item)._value_ for item in values]
-
-
-def pack_numbers(order: str, code: str, values: list[int]) -> bytes:
-    return struct.pack(f"{order}{len(values)}{code}", *values)
-
-
-class _TypeWriter:
-    """Drives a :class:`WriteEmitter` over a type."""
-
-    def __init__(self, source: Source, encoding: Encoding, plan: FunctionPlan) -> None:
-        self._source = source
-        self._encoding = encoding
-        self._plan = plan
-        self._emitter = WriteEmitter(source, encoding, Position(), listed=False)
-        self._depth = "0"
+class _TypeWriter(ValueWriter):
+    """Writes structs."""
 
     def top(self, type_: StructType, *, header: bool, padded: bool) -> None:
         emitter = self._emitter
@@ -129,176 +87,6 @@ class _TypeWriter:
         source.line(f"k = -({emitter.position}) & 3")
         emitter.resolve(encapsulation, f"{headers}[k]")
         emitter.part(f"{padding}[k]", "k", UNKNOWN)
-
-    # --- one method for each kind of type -------------------------------------------------------------
-
-    def value(self, type_: IdlType, expression: str) -> None:
-        match type_:
-            case Primitive() | EnumType() | BitmaskType():
-                self._emitter.align(self._encoding.alignment(type_.size))
-                self._emitter.item(type_.code, type_.size, self._item_expression(type_, expression))
-            case String():
-                self._string(type_, expression)
-            case SequenceType(element=Primitive() as element):
-                self._primitive_sequence(type_, element, expression)
-            case SequenceType():
-                self._sequence(type_, expression)
-            case ArrayType(element=Primitive() as element):
-                self._primitive_array(type_, element, expression)
-            case ArrayType():
-                self._array(type_, expression)
-            case StructType():
-                self._struct(type_, expression)
-
-    def _item_expression(self, type_: Primitive | EnumType | BitmaskType, expression: str) -> str:
-        if isinstance(type_, EnumType):
-            name = self._local("x", expression)
-            python_class = self._source.constant("Enum", type_.python_class)
-            with self._source.block(f"if {name}.__class__ is not {python_class}:"):
-                self._source.line(f"{name} = {python_class}({name})")
-            return name
-        if type_ == BOOLEAN:
-            return f"{self._source.define('BOOLEAN_', '{False: 0, True: 1}')}[{expression}]"
-        if type_ in (CHAR, WCHAR):
-            return f"ord({expression})"
-        return expression
-
-    def _local(self, prefix: str, expression: str) -> str:
-        """A variable that may be changed or is used more than once."""
-        name = self._source.fresh(prefix)
-        self._source.line(f"{name} = {expression}")
-        return name
-
-    def _string(self, type_: String, expression: str) -> None:
-        emitter = self._emitter
-        octets = self._local("s", f"{expression}.encode()")
-        count = self._local("n", f"len({octets})")
-        condition = f"0 in {octets}"  # IDL strings hold no NUL: a peer would read up to it
-        if type_.bound is not None:
-            condition = f"{count} > {type_.bound} or {condition}"
-        self._refuse(condition)
-        emitter.align(4)
-        emitter.item("I", 4, f"{count} + 1")
-        emitter.part(octets, count, UNKNOWN)
-        emitter.pad(1)
-
-    def _refuse(self, condition: str) -> None:
-        with self._source.block(f"if {condition}:"):
-            self._source.line("raise ValueError")
-
-    # --- collections -------------------------------------------------------------------------------------
-
-    def _primitive_sequence(self, type_: SequenceType, element: Primitive, expression: str) -> None:
-        emitter = self._emitter
-        buffer, count = self._sequence_buffer(type_, element, expression)
-        if type_.bound is not None:
-            self._refuse(f"{count} > {type_.bound}")
-        emitter.align(4)
-        emitter.item("I", 4, count)
-        if self._encoding.alignment(element.size) == 8:
-            self._align_elements(count)
-        octets = count if element.size == 1 else f"{count} * {element.size}"
-        residue = emitter.position.residue
-        emitter.part(buffer, octets, residue.advance_multiple(element.size))
-
-    def _align_elements(self, count: str) -> None:
-        """In XCDR1 padding to 8 lies between count and elements, unless there are none (measured: s05)."""
-        emitter = self._emitter
-        residue = emitter.position.residue
-        padding = residue.padding(8)
-        if padding == 0:
-            return
-        if padding is None:
-            name = self._local("z", f"-({emitter.position}) & 7 if {count} else 0")
-            table = self._source.define("ZEROS_", repr(tuple(bytes(pad) for pad in range(8))))
-            emitter.part(f"{table}[{name}]", name, residue.meet(ALIGNED) if residue.modulus >= 4 else UNKNOWN)
-        else:
-            emitter.part(f"{bytes(padding)!r} if {count} else b''", f"({padding} if {count} else 0)", Residue(4, 0))
-
-    def _sequence_buffer(self, type_: SequenceType, element: Primitive, expression: str) -> tuple[str, str]:
-        source = self._source
-        if element.is_octet:
-            buffer = self._local("b", expression)
-            with source.block(f"if {buffer}.__class__ is not bytes:"):
-                source.line(f"{buffer} = octets({buffer})")
-        elif element.is_number:
-            swap = needs_swap(little_endian=self._encoding.little_endian)
-            buffer, count = source.fresh("b"), source.fresh("n")
-            arguments = f"{expression}, '{element.code}', {element.size}, '{self._encoding.order}', swap={swap}"
-            source.line(f"{buffer}, {count} = numbers({arguments})")
-            return buffer, count
-        else:
-            buffer = self._local("b", self._characters(element, expression))
-        count = self._local("n", f"len({buffer})" if element.size == 1 else f"len({buffer}) // {element.size}")
-        return buffer, count
-
-    def _characters(self, element: Primitive, expression: str) -> str:
-        if element.name == "wchar":
-            return f"wchars({expression}, little_endian={self._encoding.little_endian})"
-        return f"{'booleans' if element.name == 'boolean' else 'chars'}({expression})"
-
-    def _primitive_array(self, type_: ArrayType, element: Primitive, expression: str) -> None:
-        emitter = self._emitter
-        dimensions = type_.dimensions
-        octets = type_.count * element.size
-        if element.is_octet:
-            buffer = f"array_octets({expression}, {dimensions})"
-        elif element.is_number:
-            swap = needs_swap(little_endian=self._encoding.little_endian)
-            layout = f"'{element.code}', {element.size}, '{self._encoding.order}', swap={swap}"
-            buffer = f"array_numbers({expression}, {dimensions}, {layout})"
-        else:
-            buffer = self._characters(element, f"flatten({expression}, {dimensions})")
-        emitter.align(self._encoding.alignment(element.size))
-        if octets <= _IN_RUN:
-            name = self._local("b", f"bytes({buffer})")
-            emitter.item(f"{octets}s", octets, name)
-        else:
-            name = self._local("b", buffer)
-            emitter.part(name, str(octets), emitter.position.residue.advance(octets))
-        if not element.is_number:
-            self._refuse(f"len({name}) != {octets}")
-
-    def _sequence(self, type_: SequenceType, expression: str) -> None:
-        emitter = self._emitter
-        value = self._local("v", expression)
-        if isinstance(type_.element, EnumType):
-            self._source.line(
-                f"{value} = enum_values({value}, {self._source.constant('Enum', type_.element.python_class)})"
-            )
-        count = self._local("n", f"len({value})")
-        condition = f"{value}.__class__ in NOT_SEQUENCES"
-        self._refuse(condition if type_.bound is None else f"{count} > {type_.bound} or {condition}")
-        delimiter = self._open_dheader(type_)
-        emitter.align(4)
-        emitter.item("I", 4, count)
-        self._elements(type_, type_.element, value, count)
-        self._close_dheader(delimiter)
-
-    def _array(self, type_: ArrayType, expression: str) -> None:
-        value = self._local("v", f"flatten({expression}, {type_.dimensions})")
-        if isinstance(type_.element, EnumType):
-            self._source.line(
-                f"{value} = enum_values({value}, {self._source.constant('Enum', type_.element.python_class)})"
-            )
-        delimiter = self._open_dheader(type_)
-        self._elements(type_, type_.element, value, str(type_.count))
-        self._close_dheader(delimiter)
-
-    def _elements(self, type_: IdlType, element: IdlType, value: str, count: str) -> None:
-        emitter, encoding = self._emitter, self._encoding
-        if isinstance(element, (EnumType, BitmaskType)):
-            emitter.align(encoding.alignment(element.size))
-            residue = emitter.position.residue.advance_multiple(element.size)
-            octets = f"{count} * {element.size}"
-            emitter.part(f"pack_numbers('{encoding.order}', '{element.code}', {value})", octets, residue)
-            return
-        residue = emitter.position.residue
-        while (behind := residue.meet(after(element, residue, encoding))) != residue:
-            residue = behind
-        item = self._source.fresh("v")
-        with emitter.loop(f"for {item} in {value}:", residue):
-            self.value(element, item)
 
     # --- structs -----------------------------------------------------------------------------------------
 
@@ -408,18 +196,3 @@ class _TypeWriter:
         self.value(member.type, expression)
         if size is None:
             emitter.resolve(length, emitter.position.minus(start))
-
-    def _open_dheader(self, type_: IdlType) -> tuple[str, Position] | None:
-        emitter = self._emitter
-        if not has_dheader(type_, self._encoding):
-            return None
-        emitter.align(4)
-        size = static_size(type_, emitter.position.residue, self._encoding)
-        length = emitter.defer("h") if size is None else str(size - 4)
-        emitter.item("I", 4, length)
-        return (length, emitter.position) if size is None else None
-
-    def _close_dheader(self, delimiter: tuple[str, Position] | None) -> None:
-        if delimiter is not None:
-            length, start = delimiter
-            self._emitter.resolve(length, self._emitter.position.minus(start))

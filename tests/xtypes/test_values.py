@@ -70,6 +70,8 @@ class Everything:
     four: Annotated[bytes, idl.array(4)] = b"\0\0\0\0"
     names: Annotated[idl.sequence[str], idl.array(2)] = ("", "")
     flat: Annotated[idl.sequence[idl.boolean], idl.array(2)] = (False, False)
+    code: Annotated[str, idl.sequence_of(idl.char), idl.array(2)] = "--"
+    board: Annotated[idl.sequence[idl.sequence[idl.wchar]], idl.array(2, 2)] = ("ab", "cd")
 
 
 def changed(**members: Any) -> Everything:
@@ -133,6 +135,9 @@ def test_characters_and_booleans(byteorder: str) -> None:
     assert there_and_back(byteorder, chars=["a", "\xff"]) == "a\xff"
     assert there_and_back(byteorder, chars="ab") == "ab"
     assert there_and_back(byteorder, wchars=["a", "\u20ac"]) == "a\u20ac"
+    assert there_and_back(byteorder, code=["x", "y"]) == "xy"
+    assert there_and_back(byteorder, code="xy") == "xy"
+    assert there_and_back(byteorder, board=[["x", "y"], "z\u20ac"]) == ["xy", "z\u20ac"]
     assert there_and_back(byteorder, char="\xff") == "\xff"
     assert there_and_back(byteorder, wchar="\u20ac") == "\u20ac"
     assert there_and_back(byteorder, boolean=np.bool_(True)) is True
@@ -255,6 +260,9 @@ UNFIT: list[tuple[dict[str, Any], str]] = [
     ({"texts": {"a": 1}}, "texts: {'a': 1} is no sequence of string"),
     ({"octets": {1, 2}}, "octets: {1, 2} is no sequence of octet"),
     ({"chars": {"a": 1}}, "chars: {'a': 1} is no sequence of char"),
+    ({"code": "abc"}, "code: 3 elements where the array has 2"),
+    ({"code": {"a": 1, "b": 2}}, "code: {'a': 1, 'b': 2} is no sequence of char"),
+    ({"board": [["x", "y"], ["x", "yz"]]}, "board[3]: 'yz' is no wchar"),
     ({"flat": [True]}, "flat: 1 elements where the array has 2"),
 ]
 
