@@ -1,11 +1,15 @@
 """Defragmenter: joins the fragments of large samples.  Other name: defrag.
 
 RTPS 2.5 §8.4.14.1 (large data).  One per remote writer, whoever reads it, so that a large sample is joined once.
-Samples are told apart by number and by whom they are addressed to, as a filtering writer may send one number to one
-reader only.
+
+Fragments may be addressed to all readers of the participant or to one of them.  What is addressed to one reader alone
+(a filtering writer sends so) is joined for that reader.  But a writer also addresses *repairs* to the one reader
+that asked, and these belong to the sample whose other fragments came for all: where there is such a sample, they are
+joined with it.
 
 A sample's octets are allocated when its first fragment comes, as large as the fragment says, so both the size of one
-sample and the sum of all unfinished ones have a bound, and their number too.
+sample and the sum of all unfinished ones have a bound, and their number too.  The sum is over all writers of a
+participant (:class:`DefragBudget`); where it is exhausted, the writer that holds most gives way.
 """
 
 from __future__ import annotations
@@ -13,35 +17,62 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ..structure.sequence_number import MAX_SET_BITS, NumberSet
+from ddsi.structure.sequence_number import MAX_SET_BITS, NumberSet
 
-__all__ = ["AssemblyKey", "Defragmenter", "PartialSample"]
+__all__ = ["FRAGMENT_SILENCE", "DefragBudget", "Defragmenter", "PartialSample"]
 
-AssemblyKey = tuple[bytes, bytes, int]
-"""Destination prefix, reader entity id (UNKNOWN for everybody), sequence number."""
+FRAGMENT_SILENCE = 0.002
+"""When no fragment of a sample has come for so many seconds, the missing ones are not just late."""
+_TO_ALL = bytes(4)
 
 
 class PartialSample:
-    """A sample of which some fragments are here.  Fragment numbers count from 1."""
+    """A sample of which some fragments are here.  Fragment numbers count from 1.
 
-    __slots__ = ("_arrived", "_missing_count", "fragment_size", "inline_qos", "last_arrival", "octets", "timestamp")
+    ``reader_id``: the reader that it is for, UNKNOWN (zeros) for all.
+    """
 
-    def __init__(self, sample_size: int, fragment_size: int) -> None:
+    __slots__ = (
+        "_arrived",
+        "_missing_count",
+        "asked_at",
+        "fragment_size",
+        "inline_qos",
+        "last_arrival",
+        "octets",
+        "reader_id",
+        "timestamp",
+    )
+
+    def __init__(self, sample_size: int, fragment_size: int, reader_id: bytes = _TO_ALL) -> None:
         self.octets = bytearray(sample_size)
         self.fragment_size = fragment_size
+        self.reader_id = reader_id
         self._missing_count = -(-sample_size // fragment_size)
         self._arrived = bytearray(self._missing_count)
         self.inline_qos: object | None = None
         self.timestamp: int | None = None
         self.last_arrival = -math.inf
+        self.asked_at = -math.inf
 
     @property
     def fragment_count(self) -> int:
         return len(self._arrived)
 
     @property
+    def memory(self) -> int:
+        """Octets that it occupies: the sample, and one for each fragment."""
+        return len(self.octets) + len(self._arrived)
+
+    @property
     def is_complete(self) -> bool:
         return self._missing_count == 0
+
+    def is_silent(self, now: float, *, may_repeat: bool) -> bool:
+        """Is it time to ask for what is missing: nothing has come for a moment, nor is an answer under way?"""
+        if now - self.last_arrival < FRAGMENT_SILENCE:
+            return False
+        return may_repeat or self.last_arrival >= self.asked_at
 
     def add(self, first: int, count: int, fragments: bytes | memoryview) -> None:
         """``count`` fragments from number ``first`` on, as they lie in the sample one after the other."""
@@ -69,31 +100,54 @@ class PartialSample:
             index = self._arrived.find(0, index + 1, end)
 
 
+class DefragBudget:
+    """The memory that all defragmenters of a participant share.  ``octets``: how much of it is taken."""
+
+    __slots__ = ("_members", "max_octets", "octets")
+
+    def __init__(self, max_octets: int) -> None:
+        self.max_octets = max_octets
+        self.octets = 0
+        self._members: dict[int, Defragmenter] = {}
+
+    def join(self, member: Defragmenter) -> None:
+        self._members[id(member)] = member
+
+    def leave(self, member: Defragmenter) -> None:
+        self._members.pop(id(member), None)
+
+    def heaviest(self) -> Defragmenter:
+        """Who holds most; of equals the one that came first."""
+        return max(self._members.values(), key=lambda member: member.octets)
+
+
 class Defragmenter:
-    """The unfinished samples of one remote writer; ``max_octets`` and ``max_samples`` bound them."""
+    """The unfinished samples of one remote writer, ``max_samples`` of them and of ``budget`` octets at most.
 
-    __slots__ = ("_max_octets", "_max_samples", "_octets", "_partial", "dropped", "keeps_lowest")
+    ``keeps_lowest``: when full, the highest number goes (a reliable writer will send it again, and the lowest is what
+    everybody waits for); else the lowest goes (best effort: it will never be finished).
+    """
 
-    def __init__(self, *, max_octets: int, max_samples: int, keeps_lowest: bool) -> None:
-        """``keeps_lowest``: when full, the highest number goes (a reliable writer will send it again, and the
-        lowest is what everybody waits for); else the oldest goes (best effort: it will never be finished)."""
-        self._max_octets = max_octets
+    __slots__ = ("_budget", "_count", "_max_samples", "_partial", "dropped", "keeps_lowest", "octets")
+
+    def __init__(self, budget: DefragBudget, *, max_samples: int, keeps_lowest: bool) -> None:
+        self._budget = budget
         self._max_samples = max_samples
         self.keeps_lowest = keeps_lowest
-        self._octets = 0
-        self._partial: dict[AssemblyKey, PartialSample] = {}
+        self.octets = 0
         self.dropped = 0
+        self._count = 0
+        # By number, then by the reader that it is for.
+        self._partial: dict[int, dict[bytes, PartialSample]] = {}
+        budget.join(self)
 
     def __len__(self) -> int:
-        return len(self._partial)
-
-    @property
-    def octets(self) -> int:
-        return self._octets
+        return self._count
 
     def add(
         self,
-        key: AssemblyKey,
+        sequence_number: int,
+        reader_id: bytes,
         *,
         sample_size: int,
         fragment_size: int,
@@ -102,10 +156,13 @@ class Defragmenter:
         fragments: bytes | memoryview,
         now: float,
     ) -> PartialSample | None:
-        """Fragments of one sample: returns it when they complete it, None while some are missing or it was refused."""
-        sample = self._partial.get(key)
+        """Fragments of one sample: the sample as far as it is here now, or None when they were refused.
+
+        When it :attr:`~PartialSample.is_complete` it is not held any more.
+        """
+        sample = self._sample_for(sequence_number, reader_id)
         if sample is None:
-            sample = self._start(key, sample_size, fragment_size)
+            sample = self._start(sequence_number, reader_id, sample_size, fragment_size)
             if sample is None:
                 return None
         elif len(sample.octets) != sample_size or sample.fragment_size != fragment_size:
@@ -113,56 +170,92 @@ class Defragmenter:
             return None
         sample.last_arrival = now
         sample.add(first, count, fragments)
-        if not sample.is_complete:
-            return None
-        self._remove(key)
+        if sample.is_complete:
+            self._remove(sequence_number, sample)
         return sample
 
-    def partial(self, key: AssemblyKey) -> PartialSample | None:
-        return self._partial.get(key)
-
-    def partial_for(self, prefix: bytes, reader_id: bytes) -> dict[int, PartialSample]:
+    def partial_for(self, reader_id: bytes) -> dict[int, PartialSample]:
         """The unfinished samples that this reader will get, by number."""
-        unknown_prefix, unknown_id = bytes(12), bytes(4)
-        return {
-            number: sample
-            for (to_prefix, to_reader, number), sample in self._partial.items()
-            if to_prefix in (prefix, unknown_prefix) and to_reader in (reader_id, unknown_id)
-        }
+        found: dict[int, PartialSample] = {}
+        for number, samples in self._partial.items():
+            sample = samples.get(_TO_ALL) or samples.get(reader_id)
+            if sample is not None:
+                found[number] = sample
+        return found
 
     def notice_number(self, sequence_number: int) -> None:
         """Everything below this number will never be wanted: it was delivered (best effort), or is settled."""
-        for key in [key for key in self._partial if key[2] < sequence_number]:
-            self._remove(key)
+        for number in [number for number in self._partial if number < sequence_number]:
+            self._remove_number(number)
 
-    def forget(self, start: int, end: int) -> None:
-        """Numbers in [start, end) are irrelevant or lost."""
-        for key in [key for key in self._partial if start <= key[2] < end]:
-            self._remove(key)
-
-    def prune(self, prefix: bytes, reader_id: bytes, above_sn: int) -> None:
-        """A reader is deleted: drop what was meant for it alone and has not reached it (numbers above ``above_sn``).
+    def prune(self, reader_id: bytes) -> None:
+        """A reader is deleted: drop what was meant for it alone.
 
         Left here it would hold memory that the other readers' samples need (Cyclone DDS: defrag_prune).
         """
-        for key in [key for key in self._partial if key[0] == prefix and key[1] == reader_id and key[2] > above_sn]:
-            self._remove(key)
+        for number, samples in list(self._partial.items()):
+            sample = samples.get(reader_id)
+            if sample is not None:
+                self._remove(number, sample)
 
-    def _start(self, key: AssemblyKey, sample_size: int, fragment_size: int) -> PartialSample | None:
-        if sample_size > self._max_octets:
-            self.dropped += 1
+    def close(self) -> None:
+        """The writer is gone: give everything back."""
+        for number in list(self._partial):
+            self._remove_number(number)
+        self._budget.leave(self)
+
+    def _sample_for(self, number: int, reader_id: bytes) -> PartialSample | None:
+        samples = self._partial.get(number)
+        if samples is None:
             return None
-        while self._partial and (
-            len(self._partial) >= self._max_samples or self._octets + sample_size > self._max_octets
-        ):
-            victim = max(self._partial, key=lambda held: held[2]) if self.keeps_lowest else next(iter(self._partial))
-            self.dropped += 1
-            if self.keeps_lowest and victim[2] <= key[2]:
-                return None
-            self._remove(victim)
-        sample = self._partial[key] = PartialSample(sample_size, fragment_size)
-        self._octets += sample_size
+        sample = samples.get(_TO_ALL) or samples.get(reader_id)
+        if sample is None and reader_id == _TO_ALL:
+            # Repairs came before any fragment for all: from here on what one reader has got is for all.
+            sample, *others = samples.values()
+            for other in others:
+                self._remove(number, other)
+            del samples[sample.reader_id]
+            samples[_TO_ALL] = sample
+            sample.reader_id = _TO_ALL
         return sample
 
-    def _remove(self, key: AssemblyKey) -> None:
-        self._octets -= len(self._partial.pop(key).octets)
+    def _start(self, number: int, reader_id: bytes, sample_size: int, fragment_size: int) -> PartialSample | None:
+        octets = sample_size - (-sample_size // fragment_size)
+        if octets > self._budget.max_octets:
+            self.dropped += 1
+            return None
+        while self._count >= self._max_samples:
+            if not self._give_way(number):
+                return None
+        while self._budget.octets + octets > self._budget.max_octets:
+            heaviest = self._budget.heaviest()
+            if not heaviest._give_way(number if heaviest is self else None):
+                return None
+        sample = PartialSample(sample_size, fragment_size, bytes(reader_id))
+        self._partial.setdefault(number, {})[sample.reader_id] = sample
+        self._count += 1
+        self.octets += sample.memory
+        self._budget.octets += sample.memory
+        return sample
+
+    def _give_way(self, newcomer: int | None) -> bool:
+        """Drop one sample to make room; False when the ``newcomer`` (a number of this writer) is the one to go."""
+        self.dropped += 1
+        victim = max(self._partial) if self.keeps_lowest else min(self._partial)
+        if self.keeps_lowest and newcomer is not None and victim <= newcomer:
+            return False
+        self._remove_number(victim)
+        return True
+
+    def _remove_number(self, number: int) -> None:
+        for sample in list(self._partial[number].values()):
+            self._remove(number, sample)
+
+    def _remove(self, number: int, sample: PartialSample) -> None:
+        samples = self._partial[number]
+        del samples[sample.reader_id]
+        if not samples:
+            del self._partial[number]
+        self._count -= 1
+        self.octets -= sample.memory
+        self._budget.octets -= sample.memory

@@ -117,19 +117,20 @@ class ReorderBuffer:
         index = bisect_right(self._range_starts, number) - 1
         return index >= 0 and number < self._range_ends[index]
 
-    def missing(self, last_sn: int, excluded: Container[int] = ()) -> NumberSet:
-        """The numbers up to ``last_sn`` (inclusive) that neither came nor are irrelevant nor ``excluded``.
+    def missing(self, last_sn: int, excluded: Container[int] = (), above: int = 0) -> NumberSet:
+        """The numbers up to ``last_sn`` (inclusive) that neither came nor are irrelevant nor ``excluded``, beyond
+        ``above``.
 
         At most 256 from ``base`` on, which is ``next_sn``: what must not be acknowledged.
         """
         self.head()
         base = self.next_sn
         end = min(last_sn + 1, base + MAX_SET_BITS)
-        return NumberSet.of(base, (number for number in self._unknown_below(end) if number not in excluded))
+        unknown = self._unknown(max(base, above + 1), end)
+        return NumberSet.of(base, (number for number in unknown if number not in excluded))
 
-    def _unknown_below(self, end: int) -> Iterator[int]:
-        """Numbers from ``next_sn`` to ``end`` (exclusive) that are neither held nor irrelevant."""
-        number = self.next_sn
+    def _unknown(self, number: int, end: int) -> Iterator[int]:
+        """Numbers from ``number`` to ``end`` (exclusive) that are neither held nor irrelevant."""
         while number < end:
             index = bisect_right(self._range_starts, number) - 1
             if index >= 0 and number < self._range_ends[index]:

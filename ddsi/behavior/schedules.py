@@ -17,7 +17,8 @@ HEARTBEATS_BEFORE_BACKOFF = 3
 NACK_RESPONSE_SUPPRESSION = 0.005  # the same change is not sent again to the same reader within this
 
 NACK_DELAY = 0.001  # a little reordering is no loss
-NACK_REPEAT_MIN = 0.05
+NACK_REPEAT_FIRST = 0.05  # before it is known how long an answer takes
+NACK_REPEAT_MIN = 0.01
 NACK_REPEAT_MAX = 2.0
 PREEMPTIVE_MIN = 0.02
 PREEMPTIVE_MAX = 5.0
@@ -65,21 +66,35 @@ class HeartbeatSchedule:
 
 
 class AckNackSchedule:
-    """When a reader answers one writer.
+    """When a reader answers one writer, and when it may ask for the same again.
 
     Preemptive ACKNACKs (20 ms, doubling to 5 s) until the first HEARTBEAT, as the writer may think that
     there is nothing to tell.  A wanted acknowledgment goes out at once.  Missing numbers are asked for after
-    1 ms, then again at 50 ms, doubling to 2 s; progress starts this over.
+    1 ms.  What was asked for is asked for again only when the answer is overdue: on a long link the repairs are still
+    under way while newer losses are noticed, and asking for all of them each time would have each sent many times over.
+    How long an answer takes is learnt from the answers; each vain repetition doubles the time, to 2 s.
     """
 
-    __slots__ = ("_last_nack", "_preemptive", "_preemptive_period", "_repeat", "due")
+    __slots__ = (
+        "_asked_at",
+        "_preemptive",
+        "_preemptive_period",
+        "_repeat",
+        "_response",
+        "asked_sn",
+        "due",
+        "is_wanted",
+    )
 
     def __init__(self) -> None:
         self.due = math.inf
+        self.asked_sn = 0  # the highest number that was asked for; what lies above is news
+        self.is_wanted = False  # a HEARTBEAT wants an answer, whether anything is missing or not
         self._preemptive = True
         self._preemptive_period = PREEMPTIVE_MIN
-        self._repeat = NACK_REPEAT_MIN
-        self._last_nack = -math.inf
+        self._repeat = NACK_REPEAT_FIRST
+        self._response = -1.0  # smoothed seconds from asking to the answer; negative: none was measured yet
+        self._asked_at = -math.inf
 
     @property
     def is_preemptive(self) -> bool:
@@ -100,26 +115,42 @@ class AckNackSchedule:
 
     def acknowledge(self, now: float) -> None:
         """A HEARTBEAT wants an answer."""
+        self.is_wanted = True
         self.due = min(self.due, now)
 
-    def missing(self, now: float) -> None:
-        """Something is known to be missing: ask soon, but not for the same again within the repeat time."""
-        self.due = min(self.due, max(now + NACK_DELAY, self._last_nack + self._repeat))
+    def missing(self, now: float, *, is_news: bool) -> None:
+        """Something is known to be missing; ``is_news``: some of it was not asked for yet."""
+        self.due = min(self.due, now + NACK_DELAY if is_news else max(now + NACK_DELAY, self.repeat_due))
 
-    def nack_sent(self, now: float) -> None:
-        """Asked; if nothing comes, ask again later."""
-        self._last_nack = now
-        self.due = now + self._repeat
-        self._repeat = min(self._repeat * 2, NACK_REPEAT_MAX)
+    @property
+    def repeat_due(self) -> float:
+        """From when on the same may be asked for again."""
+        return self._asked_at + self._repeat
 
-    def progress(self) -> None:
-        """Something that was missing came."""
-        self._repeat = NACK_REPEAT_MIN
-        self._last_nack = -math.inf
+    def nack_sent(self, now: float, highest_sn: int) -> None:
+        """Asked, for numbers up to this one; if nothing comes, ask again later."""
+        if now >= self.repeat_due and self.asked_sn >= highest_sn:
+            self._repeat = min(self._repeat * 2, NACK_REPEAT_MAX)
+        self._asked_at = now
+        self.asked_sn = max(self.asked_sn, highest_sn)
+        self.wait(self.repeat_due)
+
+    def wait(self, until: float) -> None:
+        """Answered what was wanted; more is missing, but it is not yet time to ask for it."""
+        self.is_wanted = False
+        self.due = until
+
+    def progress(self, now: float, sequence_number: int) -> None:
+        """This number, or a part of it, came.  If it had been asked for, this is how long an answer takes."""
+        if sequence_number > self.asked_sn or self._asked_at == -math.inf:
+            return
+        elapsed = now - self._asked_at
+        self._response = elapsed if self._response < 0 else self._response * 0.75 + elapsed * 0.25
+        self._repeat = min(max(2 * self._response + NACK_DELAY, NACK_REPEAT_MIN), NACK_REPEAT_MAX)
 
     def complete(self) -> None:
         """Nothing is missing and nobody waits for an answer."""
+        self.is_wanted = False
         if not self._preemptive:
             self.due = math.inf
-            self._repeat = NACK_REPEAT_MIN
-            self._last_nack = -math.inf
+            self._asked_at = -math.inf

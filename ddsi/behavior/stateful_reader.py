@@ -15,14 +15,14 @@ from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
-from .defrag import Defragmenter, PartialSample
+from .defrag import FRAGMENT_SILENCE, Defragmenter, PartialSample
+from .schedules import NACK_DELAY
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
 
 __all__ = ["ChangeSink", "RemoteWriter", "StatefulReader"]
 
-_MAX_NACK_FRAGS_AT_ONCE = 4
-_FRAGMENT_SILENCE_S = 0.002
+_MAX_NACK_FRAGS_AT_ONCE = 32
 
 
 class ChangeSink(Protocol):
@@ -186,7 +186,7 @@ class StatefulReader:
         lost = proxy.receive_heartbeat(first, last, now, final=final)
         self._deliver(proxy, now)
         if proxy.next_sn <= proxy.last_seq:
-            proxy.schedule.missing(now)
+            proxy.note_missing(now)
         return lost
 
     def _progressed(self, proxy: WriterProxy, now: float) -> None:
@@ -194,7 +194,7 @@ class StatefulReader:
         if not proxy.schedule.is_preemptive or not proxy.is_reliable:
             self._deliver(proxy, now)
         if proxy.next_sn != before:
-            proxy.schedule.progress()
+            proxy.schedule.progress(now, before)
         if proxy.is_reliable:
             proxy.note_missing(now)
 
@@ -223,20 +223,34 @@ class StatefulReader:
     def handle_timeout(
         self, proxy: WriterProxy, remote: RemoteWriter | None, now: float
     ) -> list[SendAckNack | SendNackFrag]:
-        """The proxy's schedule is due: an ACKNACK, and NACK_FRAGs for samples that came in part."""
+        """The proxy's schedule is due: an ACKNACK, and NACK_FRAGs for samples that came in part.
+
+        An ACKNACK that is only wanted as an acknowledgment leaves out what was asked for a moment ago.
+        """
         schedule = proxy.schedule
         if schedule.due > now:
             return []
         if schedule.is_preemptive:
             return [proxy.preemptive_acknack(now)]
+        may_repeat = now >= schedule.repeat_due
         partial = self._partial_samples(proxy, remote)
-        missing = proxy.missing_changes(excluded=partial)
-        out: list[SendAckNack | SendNackFrag] = [proxy.acknack(missing)]
-        for number, sample in sorted(partial.items())[:_MAX_NACK_FRAGS_AT_ONCE]:
-            if now - sample.last_arrival >= _FRAGMENT_SILENCE_S:
-                out.append(proxy.nack_frag(number, sample.missing()))
-        if missing or partial:
-            schedule.nack_sent(now)
+        missing = proxy.missing_changes(excluded=partial, above=0 if may_repeat else schedule.asked_sn)
+        silent = [
+            (number, sample)
+            for number, sample in sorted(partial.items())[:_MAX_NACK_FRAGS_AT_ONCE]
+            if sample.is_silent(now, may_repeat=may_repeat)
+        ]
+        out: list[SendAckNack | SendNackFrag] = []
+        if missing or silent or schedule.is_wanted:
+            out.append(proxy.acknack(missing))
+        for number, sample in silent:
+            sample.asked_at = now
+            out.append(proxy.nack_frag(number, sample.missing()))
+        if missing or silent:
+            schedule.nack_sent(now, max([*missing, *(number for number, _ in silent)]))
+        elif partial or proxy.next_sn <= proxy.last_seq:
+            soon = now + (FRAGMENT_SILENCE if partial else NACK_DELAY)
+            schedule.wait(soon if partial else max(soon, schedule.repeat_due))
         else:
             schedule.complete()
         return out
@@ -245,7 +259,7 @@ class StatefulReader:
         """Samples of which fragments are here: asked for by fragment, not as a whole."""
         if remote is None or not len(remote.defragmenter):
             return {}
-        partial = remote.defragmenter.partial_for(self.guid.prefix, self.guid.entity_id)
+        partial = remote.defragmenter.partial_for(self.guid.entity_id)
         return {number: sample for number, sample in partial.items() if proxy.next_sn <= number <= proxy.last_seq}
 
     def fragment_received(self, proxy: WriterProxy, sequence_number: int, now: float) -> bool:
@@ -255,5 +269,5 @@ class StatefulReader:
         if proxy.is_reliable:
             proxy.last_seq = max(proxy.last_seq, sequence_number - 1)
             if proxy.schedule.due != math.inf and not proxy.schedule.is_preemptive:
-                proxy.schedule.progress()
+                proxy.schedule.progress(now, sequence_number)
         return True

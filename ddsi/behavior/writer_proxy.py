@@ -106,9 +106,12 @@ class WriterProxy:
         """The highest number such that all up to it were delivered or will never come.  RTPS 2.5 §8.4.10.4.3."""
         return self.reorder.next_sn - 1
 
-    def missing_changes(self, excluded: Container[int] = ()) -> NumberSet:
-        """Changes the writer has and we lack, lowest first; at most 256 (one ACKNACK).  RTPS 2.5 §8.4.10.4.5."""
-        return self.reorder.missing(self.last_seq, excluded)
+    def missing_changes(self, excluded: Container[int] = (), above: int = 0) -> NumberSet:
+        """Changes the writer has and we lack, lowest first; at most 256 (one ACKNACK).  RTPS 2.5 §8.4.10.4.5.
+
+        Without those ``excluded`` and those up to ``above``; its base is what must not be acknowledged all the same.
+        """
+        return self.reorder.missing(self.last_seq, excluded, above)
 
     def irrelevant_change_set(self, start: int, numbers: NumberSet) -> None:
         """GAP: [start, base) and the members of the set will never come.  RTPS 2.5 §8.4.10.4.1, §8.3.8.4."""
@@ -148,8 +151,8 @@ class WriterProxy:
     def note_missing(self, now: float) -> None:
         """Arm the timer if something known to exist has not come."""
         if self.reorder.next_sn <= self.last_seq:
-            self.schedule.missing(now)
-        elif not self.schedule.is_preemptive and self.schedule.due > now:
+            self.schedule.missing(now, is_news=self.last_seq > self.schedule.asked_sn)
+        elif not self.schedule.is_preemptive and not self.schedule.is_wanted:
             self.schedule.complete()
 
     def preemptive_acknack(self, now: float) -> SendAckNack:

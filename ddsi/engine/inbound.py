@@ -406,10 +406,10 @@ class Inbound:
         if len(fragments) < data.run_length:
             raise MalformedMessage(f"{len(fragments)} octets of {data.run_length}", element="DATA_FRAG")
         defragmenter = remote.defragmenter
-        key = (incoming.destination, bytes(data.reader_id), data.writer_sn)
         dropped = defragmenter.dropped
         sample = defragmenter.add(
-            key,
+            data.writer_sn,
+            bytes(data.reader_id),
             sample_size=data.sample_size,
             fragment_size=data.fragment_size,
             first=data.fragment_starting_num,
@@ -417,17 +417,19 @@ class Inbound:
             fragments=fragments,
             now=incoming.now,
         )
-        held = sample or defragmenter.partial(key)
-        if held is not None and (data.inline_qos is not None or held.timestamp is None):
-            # Cyclone DDS sends inline QoS with the first fragment only, which may come last.
-            held.inline_qos = data.inline_qos or held.inline_qos
-            held.timestamp = incoming.timestamp
         if defragmenter.dropped != dropped:
             self._engine.dropped(DropReason.TABLE_FULL_FRAGMENTS, incoming.source)
-        if sample is not None:
-            incoming.timestamp = sample.timestamp
+        if sample is None:
+            return
+        if data.inline_qos is not None or sample.timestamp is None:
+            # Cyclone DDS sends inline QoS with the first fragment only, which may come last.
+            sample.inline_qos = data.inline_qos or sample.inline_qos
+            sample.timestamp = incoming.timestamp
+        if sample.is_complete:
+            timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp
             inline = _InlineQos.read(sample.inline_qos)
-            self._joined(incoming, remote, data.reader_id, data.writer_sn, sample.octets, inline, is_key=data.is_key)
+            self._joined(incoming, remote, sample.reader_id, data.writer_sn, sample.octets, inline, is_key=data.is_key)
+            incoming.timestamp = timestamp
 
     # --- HEARTBEAT, GAP ----------------------------------------------------------------------------------
 

@@ -203,7 +203,7 @@ class Matchmaker:
         remote = engine.remote_writers.get(data.guid)
         if remote is None:
             defragmenter = Defragmenter(
-                max_octets=engine.config.max_defrag_octets,
+                engine.defrag_budget,
                 max_samples=engine.config.max_reorder_samples,
                 keeps_lowest=data.qos.is_reliable,
             )
@@ -257,9 +257,10 @@ class Matchmaker:
         remote = engine.remote_writers.get(guid)
         if remote is None or proxy is None:
             return
-        remote.defragmenter.prune(engine.guid.prefix, reader.guid.entity_id, proxy.last_seq)
+        remote.defragmenter.prune(reader.guid.entity_id)
         remote.readers = [pair for pair in remote.readers if pair[1] is not proxy]
         if not remote.readers:
+            remote.defragmenter.close()
             del engine.remote_writers[guid]
             engine.liveliness.remote_writer_gone(guid)
         else:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from random import Random
 from typing import TYPE_CHECKING, TypeVar
 
+from ..behavior.defrag import DefragBudget
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
@@ -148,6 +149,7 @@ class Participant:
         self._readers_by_topic: dict[str, dict[Guid, LocalReader]] = {}
         self.remote_writers: dict[bytes, RemoteWriter] = {}
         self.closing: set[Guid] = set()
+        self.defrag_budget = DefragBudget(setup.config.max_defrag_octets)
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
         self._max_message_octets = setup.max_message_octets
         self.outbound = Outbound(header, setup.max_message_octets, hooks, self._effects.append)
@@ -475,7 +477,7 @@ class Participant:
         remote = self.remote_writers.get(proxy.guid)
         if remote is None:
             return
-        sample = remote.defragmenter.partial_for(self.guid.prefix, reader.guid.entity_id).get(number)
+        sample = remote.defragmenter.partial_for(reader.guid.entity_id).get(number)
         missing = sample.missing(last_fragment) if sample is not None else None
         if missing:
             self.outbound.answer(reader.guid, proxy, [proxy.nack_frag(number, missing)])

@@ -184,9 +184,10 @@ def _bound_flaws(node: Node) -> Iterator[str]:
         for proxy in reader.behavior.writers.values():
             if len(proxy.reorder) > config.max_reorder_samples + _SLACK:
                 yield f"{len(proxy.reorder)} samples wait for their turn in {reader.guid}"
-    for remote in engine.remote_writers.values():
-        if remote.defragmenter.octets > config.max_defrag_octets:
-            yield f"{remote.defragmenter.octets} octets of unfinished samples of {remote.guid}"
+    if engine.defrag_budget.octets > config.max_defrag_octets:
+        yield f"{engine.defrag_budget.octets} octets of unfinished samples"
+    if engine.defrag_budget.octets != sum(remote.defragmenter.octets for remote in engine.remote_writers.values()):
+        yield f"{engine.defrag_budget.octets} octets of unfinished samples are counted wrongly"
     for writer in engine.local_writers.values():
         yield from _history_flaws(writer)
 
