@@ -51,9 +51,15 @@ _LIMITS = (
     ),
     _Limit(
         frozenset({"appendable-xcdr2-dispose"}),
-        CYCLONES,
-        CYCLONES,
-        "0.10 writes the key of an appendable type without a delimiter header, 11 with it",
+        frozenset({"cyclone11", "ddsi"}),
+        frozenset({"cyclone"}),
+        "Cyclone 0.10 reads the key of an appendable type without its delimiter header",
+    ),
+    _Limit(
+        frozenset({"appendable-xcdr2-dispose"}),
+        frozenset({"cyclone"}),
+        frozenset({"cyclone11"}),
+        "Cyclone 0.10 writes the key of an appendable type without its delimiter header",
     ),
     _Limit(
         frozenset({"fragments", "fragments-late"}),
