@@ -59,6 +59,7 @@ class LocalWriter:
         "guid",
         "has_fresh_samples",
         "incompatible",
+        "inconsistent",
         "liveliness",
         "matched",
         "packer",
@@ -78,6 +79,7 @@ class LocalWriter:
         self.receivers: tuple[Guid, ...] = ()
         self.matched = PublicationMatched()
         self.incompatible = OfferedIncompatibleQos()
+        self.inconsistent = InconsistentTopic()
         self.liveliness = LivelinessLost()
         self.timer_due = float("inf")
         self.assertion_due = float("inf")
@@ -105,6 +107,10 @@ class LocalWriter:
         )
         return self.incompatible
 
+    def inconsistent_topic(self, remote_type_name: str) -> Status:
+        self.inconsistent = _one_more(self.inconsistent, remote_type_name)
+        return self.inconsistent
+
     def liveliness_lost(self) -> Status:
         self.liveliness = replace(self.liveliness, total_count=self.liveliness.total_count + 1, total_count_change=1)
         return self.liveliness
@@ -125,6 +131,7 @@ class LocalReader:
     liveliness: LivelinessChanged = LivelinessChanged()
     lost: SampleLost = SampleLost()
     rejected: SampleRejected = SampleRejected()
+    inconsistent: InconsistentTopic = InconsistentTopic()
     _keys_by_hash: dict[bytes, bytes] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -174,7 +181,8 @@ class LocalReader:
         return self.rejected
 
     def inconsistent_topic(self, remote_type_name: str) -> Status:
-        return InconsistentTopic(total_count=1, total_count_change=1, remote_type_name=remote_type_name)
+        self.inconsistent = _one_more(self.inconsistent, remote_type_name)
+        return self.inconsistent
 
     def key_of(self, change: CacheChange) -> bytes | None:
         """The canonical key of the change's instance; None when it cannot be told.  Raises MalformedSample.
@@ -203,3 +211,9 @@ class LocalReader:
                 if key not in hashed and self.keys is not None:
                     known[self.keys.to_key_hash(key)] = key
         return known.get(key_hash)
+
+
+def _one_more(status: InconsistentTopic, remote_type_name: str) -> InconsistentTopic:
+    return InconsistentTopic(
+        total_count=status.total_count + 1, total_count_change=1, remote_type_name=remote_type_name
+    )

@@ -121,9 +121,8 @@ class Matchmaker:
         if refusal is not None:
             if matched:
                 self._unmatch_reader(writer, data.guid, LossReason.QOS_CHANGED, now)
-            is_news = self._refused(writer.guid, data.guid, data.topic_name, refusal)
-            if is_news and refusal.kind is RefusalKind.QOS:
-                engine.status(writer.guid, writer.found_incompatible(data.guid, refusal.incompatibilities))
+            if self._refused(writer.guid, data.guid, data.topic_name, refusal):
+                self._tell(writer, data, refusal)
         elif matched:
             writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
         else:
@@ -143,10 +142,7 @@ class Matchmaker:
             if proxy is not None:
                 self.unmatch_writer(reader, data.guid, LossReason.QOS_CHANGED, now)
             if self._refused(reader.guid, data.guid, data.topic_name, refusal):
-                if refusal.kind is RefusalKind.QOS:
-                    engine.status(reader.guid, reader.found_incompatible(data.guid, refusal.incompatibilities))
-                elif refusal.kind is RefusalKind.TYPE:
-                    engine.status(reader.guid, reader.inconsistent_topic(data.type_name))
+                self._tell(reader, data, refusal)
         elif proxy is not None:
             proxy.data = data
             proxy.locators = participant.user_traffic(data.unicast)
@@ -162,11 +158,9 @@ class Matchmaker:
         if refusal is not None:
             if matched:
                 self._unmatch_local(writer, reader, LossReason.QOS_CHANGED, now)
-            is_news = self._refused(writer.guid, reader.guid, writer.data.topic_name, refusal)
-            if is_news and refusal.kind is RefusalKind.QOS:
-                reasons = refusal.incompatibilities
-                self._engine.status(writer.guid, writer.found_incompatible(reader.guid, reasons))
-                self._engine.status(reader.guid, reader.found_incompatible(writer.guid, reasons))
+            if self._refused(writer.guid, reader.guid, writer.data.topic_name, refusal):
+                self._tell(writer, reader.data, refusal)
+                self._tell(reader, writer.data, refusal)
         elif not matched and writer.guid not in self._engine.closing:
             self._match_local(writer, reader, now)
 
@@ -279,6 +273,18 @@ class Matchmaker:
         engine.writer_progressed(writer)
 
     # --- refusals ----------------------------------------------------------------------------------------
+
+    def _tell(
+        self,
+        endpoint: LocalWriter | LocalReader,
+        other: DiscoveredWriterData | DiscoveredReaderData,
+        refusal: MatchRefusal,
+    ) -> None:
+        """The application hears of policies and types that do not fit; another partition is nobody's mistake."""
+        if refusal.kind is RefusalKind.QOS:
+            self._engine.status(endpoint.guid, endpoint.found_incompatible(other.guid, refusal.incompatibilities))
+        elif refusal.kind is RefusalKind.TYPE:
+            self._engine.status(endpoint.guid, endpoint.inconsistent_topic(other.type_name))
 
     def _admits(self, local: Guid, remote: Guid, topic_name: str, admission: Admission) -> bool:
         if admission is PENDING:
