@@ -33,6 +33,9 @@ __all__ = ["generate_key_extractor"]
 
 _Path = tuple[str, ...]
 
+_MOST_SKIPPED = 256
+"""Parts of variable size before the key; a type with more of them is read whole."""
+
 
 class _NoExtractorError(Exception):
     """The type has a part over which generated code cannot jump."""
@@ -65,6 +68,7 @@ class _KeyFinder:
         self._source = source
         self._encoding = encoding
         self._emitter = ReadEmitter(source, encoding, base="", offset=4, residue=ALIGNED)
+        self._skipped = 0
         self.found: dict[_Path, tuple[str, ...]] = {}
 
     def top(self, struct: StructType) -> None:
@@ -149,6 +153,13 @@ class _KeyFinder:
 
     def _skip(self, type_: IdlType) -> None:
         emitter = self._emitter
+        size = static_size(type_, emitter.residue, self._encoding)
+        if size is not None:
+            emitter.pass_over(size)
+            return
+        self._skipped += 1
+        if self._skipped > _MOST_SKIPPED:
+            raise _NoExtractorError
         if has_dheader(type_, self._encoding):
             emitter.align(4)
             self._jump(emitter.item("I", 4, "h"), 1, UNKNOWN)
@@ -167,9 +178,10 @@ class _KeyFinder:
             case ArrayType(element=Primitive(size=size)):
                 emitter.align(self._encoding.alignment(size))
                 emitter.pass_over(type_.count * size)
+            case ArrayType(count=count) if count <= _MOST_SKIPPED:
+                for _ in range(count):
+                    self._skip(type_.element)
             case StructType(extensibility=Extensibility.FINAL | Extensibility.APPENDABLE):
-                if static_size(type_, emitter.residue, self._encoding) is None and len(type_.members) > 64:
-                    raise _NoExtractorError
                 for member in type_.members:
                     if member.is_optional:
                         raise _NoExtractorError

@@ -149,25 +149,22 @@ def first_alignment(type_: IdlType) -> int:
 
 def static_size(type_: IdlType, start: Residue, encoding: Encoding) -> int | None:
     """Octets of any value that begins at ``start`` (leading padding included); None if that depends on the value."""
-    return _static_size(type_, start, encoding, frozenset())
-
-
-def _static_size(type_: IdlType, start: Residue, encoding: Encoding, inside: frozenset[int]) -> int | None:
     match type_:
         case Primitive() | EnumType() | BitmaskType():
             padding = start.padding(encoding.alignment(type_.size))
             return None if padding is None else padding + type_.size
         case ArrayType():
-            return _static_array_size(type_, start, encoding, inside)
+            return _static_array_size(type_, start, encoding)
         case StructType():
-            if id(type_) in inside:
-                return None
-            return _static_struct_size(type_, start, encoding, inside | {id(type_)})
+            known = type_.static_sizes
+            if (start, encoding) not in known:  # else types that multiply by nesting would take exponential time
+                known[start, encoding] = _static_struct_size(type_, start, encoding)
+            return known[start, encoding]
         case _:
             return None
 
 
-def _static_array_size(array: ArrayType, start: Residue, encoding: Encoding, inside: frozenset[int]) -> int | None:
+def _static_array_size(array: ArrayType, start: Residue, encoding: Encoding) -> int | None:
     if has_dheader(array, encoding):
         padding = start.padding(4)
         if padding is None:
@@ -178,17 +175,17 @@ def _static_array_size(array: ArrayType, start: Residue, encoding: Encoding, ins
     if array.count > 4096 and not isinstance(array.element, Primitive):
         return None  # not worth a closed form
     if isinstance(array.element, Primitive):
-        first = _static_size(array.element, start.advance(size), encoding, inside)
+        first = static_size(array.element, start.advance(size), encoding)
         return None if first is None else size + first + (array.count - 1) * array.element.size
     for _ in range(array.count):
-        element = _static_size(array.element, start.advance(size), encoding, inside)
+        element = static_size(array.element, start.advance(size), encoding)
         if element is None:
             return None
         size += element
     return size
 
 
-def _static_struct_size(struct: StructType, start: Residue, encoding: Encoding, inside: frozenset[int]) -> int | None:
+def _static_struct_size(struct: StructType, start: Residue, encoding: Encoding) -> int | None:
     if any(member.is_optional for member in struct.members):
         return None
     mutable = struct.extensibility is Extensibility.MUTABLE
@@ -200,9 +197,9 @@ def _static_struct_size(struct: StructType, start: Residue, encoding: Encoding, 
         size = padding + 4
     for member in struct.members:
         if mutable:
-            octets = _static_parameter_size(member, start.advance(size), encoding, inside)
+            octets = _static_parameter_size(member, start.advance(size), encoding)
         else:
-            octets = _static_size(member.type, start.advance(size), encoding, inside)
+            octets = static_size(member.type, start.advance(size), encoding)
         if octets is None:
             return None
         size += octets
@@ -212,15 +209,15 @@ def _static_struct_size(struct: StructType, start: Residue, encoding: Encoding, 
     return size
 
 
-def _static_parameter_size(member: Member, start: Residue, encoding: Encoding, inside: frozenset[int]) -> int | None:
+def _static_parameter_size(member: Member, start: Residue, encoding: Encoding) -> int | None:
     padding = start.padding(4)
     if padding is None:
         return None
     if not encoding.is_xcdr2:
-        value = _static_size(member.type, ALIGNED, encoding, inside)
+        value = static_size(member.type, ALIGNED, encoding)
         return None if value is None else padding + 12 + value + -value % 4
     header = 8 if emheader_length_code(member.type) == 4 else 4
-    value = _static_size(member.type, start.advance(padding + header), encoding, inside)
+    value = static_size(member.type, start.advance(padding + header), encoding)
     return None if value is None else padding + header + value
 
 

@@ -193,7 +193,16 @@ class StructType:
     Python class which this type does not have on the wire.
     """
 
-    __slots__ = ("_members", "_resolve", "base", "extensibility", "omitted", "python_class", "type_name")
+    __slots__ = (
+        "_members",
+        "_resolve",
+        "base",
+        "extensibility",
+        "omitted",
+        "python_class",
+        "static_sizes",
+        "type_name",
+    )
 
     MAX_DEPTH: ClassVar[int] = 64
     """How deep values of a recursive type may nest, written or read."""
@@ -215,6 +224,7 @@ class StructType:
         self.omitted = omitted
         self._resolve = resolve
         self._members: tuple[Member, ...] | None = None
+        self.static_sizes: dict[Any, int | None] = {}  # what ``layout.static_size`` found
 
     @property
     def members(self) -> tuple[Member, ...]:

@@ -84,10 +84,11 @@ class _TypeReader(ValueReader):
     def _struct(self, type_: StructType) -> str:
         function = self._plan.function(type_)
         if function is None:
-            return self._struct_body(type_)
+            with self._plan.inside():
+                return self._struct_body(type_)
         name, is_new = function
         if is_new:
-            with self._source.apart():
+            with self._source.apart(), self._plan.inside(0):
                 self._write_function(f"read_{name}", type_)
         emitter = self._emitter
         emitter.flush()

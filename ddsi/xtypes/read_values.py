@@ -33,7 +33,8 @@ from .source import Source
 __all__ = ["ValueReader", "enumerations", "numpy_numbers"]
 
 _IN_RUN = 256
-"""Arrays of primitives up to so many octets are part of a run; larger ones are copied only once."""
+"""Arrays of primitives up to so many octets are part of a run; larger ones are copied only once.  And the most octets
+of an element that is read as one run."""
 
 
 def numpy_numbers(type_: SequenceType | ArrayType, order: str, octets: Any, start: int, end: int) -> Any:
@@ -217,7 +218,8 @@ class ValueReader:
             return value
         emitter.then(f"{value} = []")
         size = static_size(element, emitter.residue, encoding)
-        if size is not None and emitter.residue.advance(size) == emitter.residue and self._is_run(element):
+        repeats = size is not None and size <= _IN_RUN and emitter.residue.advance(size) == emitter.residue
+        if size is not None and repeats and self._is_run(element):
             self._elements_by_iter_unpack(element, count, value, size)
             return value
         residue = emitter.residue
@@ -264,7 +266,8 @@ class ValueReader:
         start, residue = emitter.position, emitter.residue
         end = source.fresh("e")
         emitter.then(f"{end} = {start} + {count} * {size}")
-        expression = self.value(element)
+        with self._plan.inlining_all():  # at most as many structs as octets
+            expression = self.value(element)
         codes, names = emitter.take_run()
         leading = size - struct.calcsize(self._encoding.order + codes)  # where elements begin with padding
         codes = f"{leading}x{codes}" if leading else codes

@@ -1,10 +1,14 @@
 """Which nested structs get a function of their own in generated code, and which are written in line.
 
-In line is faster, since runs merge.  A struct that contains itself must be a function; and so must the rest of a
-type whose nesting multiplies beyond a bound, or the source would grow exponentially with its depth.
+In line is faster, since runs merge.  A struct that contains itself must be a function; so must one nested deeply, as
+Python bounds the nesting of blocks; and so must the rest of a type whose nesting multiplies beyond a bound, or the
+source would grow exponentially with its depth.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from .model import StructType, nested_structs, reachable_structs
 
@@ -12,6 +16,9 @@ __all__ = ["FunctionPlan", "is_recursive"]
 
 _MOST_INLINED = 128
 """Structs put in line in one generated module; those beyond become functions."""
+
+_DEEPEST_INLINED = 8
+"""Structs in line inside one another.  Each may open a loop, and Python nests 20 of them."""
 
 
 def is_recursive(struct: StructType) -> bool:
@@ -31,15 +38,35 @@ class FunctionPlan:
         self._recursive = {id(struct) for struct in reachable_structs(root) if is_recursive(struct)}
         self._functions: dict[int, str] = {}
         self._inlined = 0
+        self._depth = 0
+        self._inlining_all = False
 
     def function(self, struct: StructType) -> tuple[str, bool] | None:
         """None: write it in line.  Else the function's name, and True when it is yet to be written."""
+        if self._inlining_all:
+            return None
         known = self._functions.get(id(struct))
         if known is not None:
             return known, False
-        if id(struct) not in self._recursive and self._inlined < _MOST_INLINED:
+        fits = self._inlined < _MOST_INLINED and self._depth < _DEEPEST_INLINED
+        if fits and id(struct) not in self._recursive:
             self._inlined += 1
             return None
         name = f"{struct.python_class.__name__}_{len(self._functions)}"
         self._functions[id(struct)] = name
         return name, True
+
+    @contextmanager
+    def inside(self, depth: int | None = None) -> Iterator[None]:
+        """While a struct is written in line; ``depth`` 0 while it is written as a function."""
+        before = self._depth
+        self._depth = before + 1 if depth is None else depth
+        yield
+        self._depth = before
+
+    @contextmanager
+    def inlining_all(self) -> Iterator[None]:
+        """While a struct is written of which all parts are known to be few, and none recursive."""
+        before, self._inlining_all = self._inlining_all, True
+        yield
+        self._inlining_all = before

@@ -7,7 +7,6 @@ representation and byte order.  DDS 1.4 §2.2.2.3.6 (TypeSupport), DDS-XTypes 1.
 from __future__ import annotations
 
 import hashlib
-import itertools
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Generic, Literal, TypeVar
@@ -19,8 +18,9 @@ from .definition import struct_type
 from .key_source import generate_key_extractor
 from .keys import KEY_HASH_OCTETS, alignments_differ, canonical_key_type, hash_is_digest, key_type, undelimited_key_type
 from .layout import Encoding, encapsulations
-from .model import ArrayType, Extensibility, IdlType, SequenceType, StructType, reachable_structs
+from .model import Extensibility, StructType
 from .read_source import generate_reader
+from .topic_type import complete, default_representations
 from .value_check import check_sample
 from .write_source import generate_writer
 
@@ -79,7 +79,7 @@ class TypeSupport(Generic[T]):
         self.struct = struct
         self.type_name: str = struct.type_name
         self.extensibility: Extensibility = struct.extensibility
-        self.representations: tuple[DataRepresentationId, ...] = _representations(_resolved(struct))
+        self.representations: tuple[DataRepresentationId, ...] = default_representations(complete(struct))
         self._sources: dict[tuple[Any, ...], str] = {}
         self._writers: dict[tuple[Any, ...], Callable[[Any], bytes]] = {}
         key, canonical = key_type(struct), canonical_key_type(struct)
@@ -287,10 +287,7 @@ class TypeSupport(Generic[T]):
     def _key_extractor(self, struct: StructType, canonical: StructType) -> Callable[[Octets], bytes]:
         extractors: dict[bytes, Callable[[Any], bytes]] = {}
         for identifier, encoding in encapsulations(struct.extensibility).items():
-            generated = generate_key_extractor(struct, canonical, encoding)
-            if generated is not None:
-                extractors[identifier], text = generated
-                self._sources[struct, encoding, "key"] = text
+            self._install_extractor_lazily(extractors, identifier, struct, canonical, encoding)
         deserialize, key_of = self.deserialize, self._key_of
 
         def key_from_payload(octets: Octets) -> bytes:
@@ -301,6 +298,24 @@ class TypeSupport(Generic[T]):
 
         return key_from_payload
 
+    def _install_extractor_lazily(
+        self,
+        extractors: dict[bytes, Callable[[Any], bytes]],
+        identifier: bytes,
+        struct: StructType,
+        canonical: StructType,
+        encoding: Encoding,
+    ) -> None:
+        def generate_first(octets: Any) -> bytes:
+            generated = generate_key_extractor(struct, canonical, encoding)
+            if generated is None:
+                extractors[identifier] = lambda octets: self._key_of(self.deserialize(octets))
+            else:
+                extractors[identifier], self._sources[struct, encoding, "key"] = generated
+            return extractors[identifier](octets)
+
+        extractors[identifier] = generate_first
+
 
 def _no_key(_: Any) -> bytes:
     return b""
@@ -310,57 +325,3 @@ def _checked_representation(representation: Any) -> DataRepresentationId:
     if representation in (XCDR1, XCDR2):
         return DataRepresentationId(representation)
     raise BadParameter(f"the representation is XCDR1 or XCDR2, not {representation!r}")
-
-
-def _resolved(struct: StructType) -> StructType:
-    """The struct with all its members found, and checked for what one class alone cannot show."""
-    try:
-        for inner in reachable_structs(struct):
-            _refuse_endless(inner)
-    except NameError as error:
-        raise BadParameter(f"{struct.type_name}: an annotation cannot be resolved: {error}") from error
-    return struct
-
-
-def _refuse_endless(struct: StructType) -> None:
-    """A struct that holds itself by value has no finite sample."""
-    pending = [struct]
-    seen: set[int] = set()
-    while pending:
-        candidate = pending.pop()
-        for member in candidate.members:
-            type_: IdlType = member.type
-            while isinstance(type_, ArrayType):
-                type_ = type_.element
-            if member.is_optional or not isinstance(type_, StructType):
-                continue
-            if type_ is struct:
-                raise BadParameter(
-                    f"{candidate.python_class.__name__}.{member.name}: {struct.type_name} would contain itself without"
-                    " end; put it in a sequence, or make it optional"
-                )
-            if id(type_) not in seen:
-                seen.add(id(type_))
-                pending.append(type_)
-
-
-def _representations(struct: StructType) -> tuple[DataRepresentationId, ...]:
-    """What the type can be sent in; a writer's default first.
-
-    XCDR1 reaches every vendor, but cannot delimit an appendable type inside another, and its forms of optional and
-    mutable differ between vendors: there XCDR2 comes first.
-    """
-    structs = list(itertools.islice(reachable_structs(struct), 4096))
-    prefers_xcdr2 = any(
-        inner.extensibility is Extensibility.MUTABLE
-        or any(member.is_optional for member in inner.members)
-        or (inner.extensibility is Extensibility.APPENDABLE and inner is not struct)
-        for inner in structs
-    ) or any(inner is struct for outer in structs for member in outer.members for inner in _elements(member.type))
-    return (XCDR2, XCDR1) if prefers_xcdr2 else (XCDR1, XCDR2)
-
-
-def _elements(type_: IdlType) -> list[StructType]:
-    while isinstance(type_, (SequenceType, ArrayType)):
-        type_ = type_.element
-    return [type_] if isinstance(type_, StructType) else []

@@ -93,11 +93,12 @@ class _TypeWriter(ValueWriter):
     def _struct(self, type_: StructType, expression: str) -> None:
         function = self._plan.function(type_)
         if function is None:
-            self.struct_body(type_, self._local("v", expression))
+            with self._plan.inside():
+                self.struct_body(type_, self._local("v", expression))
             return
         name, is_new = function
         if is_new:
-            with self._source.apart():
+            with self._source.apart(), self._plan.inside(0):
                 self._write_function(f"write_{name}", type_)
         self._emitter.call(f"write_{name}", expression, f"{self._depth} + 1")
 

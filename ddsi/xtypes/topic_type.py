@@ -1,0 +1,63 @@
+"""A topic type as a whole: complete at first use, finite, and sent in one representation rather than another."""
+
+from __future__ import annotations
+
+from ..structure.errors import BadParameter
+from ..structure.qos_policies import DataRepresentationId
+from .model import ArrayType, Extensibility, IdlType, StructType, reachable_structs
+from .recursion import is_recursive
+
+__all__ = ["complete", "default_representations"]
+
+XCDR1, XCDR2 = DataRepresentationId.XCDR1, DataRepresentationId.XCDR2
+
+
+def complete(struct: StructType) -> StructType:
+    """The struct with all its members found, and checked for what one class alone cannot show.
+
+    Raises BadParameter where an annotation names what is not defined, or the type would be endless.
+    """
+    try:
+        for inner in reachable_structs(struct):
+            _refuse_endless(inner)
+    except NameError as error:
+        raise BadParameter(f"{struct.type_name}: an annotation cannot be resolved: {error}") from error
+    return struct
+
+
+def _refuse_endless(struct: StructType) -> None:
+    """A struct that holds itself by value has no finite sample."""
+    pending = [struct]
+    seen: set[int] = set()
+    while pending:
+        candidate = pending.pop()
+        for member in candidate.members:
+            type_: IdlType = member.type
+            while isinstance(type_, ArrayType):
+                type_ = type_.element
+            if member.is_optional or not isinstance(type_, StructType):
+                continue
+            if type_ is struct:
+                raise BadParameter(
+                    f"{candidate.python_class.__name__}.{member.name}: {struct.type_name} would contain itself without"
+                    " end; put it in a sequence, or make it optional"
+                )
+            if id(type_) not in seen:
+                seen.add(id(type_))
+                pending.append(type_)
+
+
+def default_representations(struct: StructType) -> tuple[DataRepresentationId, ...]:
+    """What the type can be sent in; a writer's default first.
+
+    XCDR1 reaches every vendor, but cannot delimit an appendable type inside another, and its forms of optional and
+    mutable differ between vendors: there XCDR2 comes first.
+    """
+    structs = list(reachable_structs(struct))
+    prefers_xcdr2 = is_recursive(struct) or any(
+        inner.extensibility is Extensibility.MUTABLE
+        or any(member.is_optional for member in inner.members)
+        or (inner.extensibility is Extensibility.APPENDABLE and inner is not struct)
+        for inner in structs
+    )
+    return (XCDR2, XCDR1) if prefers_xcdr2 else (XCDR1, XCDR2)
