@@ -7,7 +7,9 @@ GAP in the datagram of the next sample that it does get, or in answer to its ACK
 sent.  Each reader has a HEARTBEAT of its own, under its own key, that speaks of its own numbers only: ``last`` is
 ``lst_seq``, so a reader that has all of its samples is never asked again because somebody else lacks one.
 
-Pure functions over a WriterHistoryCache and a ReaderProxy; writer-side content filters will use them too.
+Here are pure functions over a WriterHistoryCache and a ReaderProxy; :mod:`ddsi.behavior.filtering_writer` is the
+writer that uses them, and writer-side content filters will too.  On the reader's side nothing is special but that
+numbers which are skipped are no loss (``WriterProxy.uses_filter``).
 """
 
 from __future__ import annotations
@@ -64,10 +66,7 @@ def gap_for(cache: WriterHistoryCache, reader: ReaderProxy, irrelevant: Iterable
 def directed_heartbeat_range(cache: WriterHistoryCache, reader: ReaderProxy, last_sn: int) -> tuple[int, int]:
     """(first, last) for a HEARTBEAT to one reader; ``first == last + 1`` when there is nothing for it."""
     last = min(last_sn, reader.lst_seq)
-    first = max(cache.first_sn, reader.history_sn + 1)
-    while first <= last and is_irrelevant(cache, reader, first):
-        first += 1
-    return first if first <= last else last + 1, last
+    return min(max(cache.first_sn, reader.history_sn + 1), last + 1), last
 
 
 def _end_of_run(cache: WriterHistoryCache, reader: ReaderProxy, start: int, end_sn: int) -> int:

@@ -18,6 +18,7 @@ from .schedules import NACK_RESPONSE_SUPPRESSION
 __all__ = ["ReaderProxy"]
 
 _PREEMPTIVE_ANSWER_INTERVAL_S = 0.005
+_STALE_COUNT_S = 0.5
 
 
 class ReaderProxy:
@@ -27,6 +28,7 @@ class ReaderProxy:
         "_last_acknack_count",
         "_last_acknack_time",
         "_last_nack_frag_count",
+        "_last_nack_frag_time",
         "_last_preemptive",
         "_participant",
         "_resent",
@@ -61,6 +63,7 @@ class ReaderProxy:
         self._last_acknack_count = 0
         self._last_acknack_time = -math.inf
         self._last_nack_frag_count = 0
+        self._last_nack_frag_time = -math.inf
         self._last_preemptive = -math.inf
         self._resent: dict[int, float] = {}
 
@@ -106,7 +109,7 @@ class ReaderProxy:
         After half a second any count is taken: a peer that counts anew must not be ignored for ever.
         """
         age = _serial_difference(count, self._last_acknack_count)
-        if age <= 0 and now - self._last_acknack_time < 0.5:
+        if age <= 0 and now - self._last_acknack_time < _STALE_COUNT_S:
             return False
         self._last_acknack_count = count
         self._last_acknack_time = now
@@ -119,10 +122,13 @@ class ReaderProxy:
         self._last_preemptive = now
         return True
 
-    def accepts_nack_frag(self, count: int) -> bool:
-        if _serial_difference(count, self._last_nack_frag_count) <= 0:
+    def accepts_nack_frag(self, count: int, now: float) -> bool:
+        """The same for NACK_FRAG, which is counted apart."""
+        age = _serial_difference(count, self._last_nack_frag_count)
+        if age <= 0 and now - self._last_nack_frag_time < _STALE_COUNT_S:
             return False
         self._last_nack_frag_count = count
+        self._last_nack_frag_time = now
         return True
 
     def may_resend(self, sequence_number: int, now: float) -> bool:

@@ -38,8 +38,8 @@ class HeartbeatSchedule:
         self._unanswered = 0
 
     def written(self, now: float) -> None:
-        """A change was added.  Leaves a running timer alone: it is never further away than its period."""
-        if self.due == math.inf:
+        """A change was added, or somebody lacks one: begin, or begin anew after a long silence."""
+        if self.due - now > HEARTBEAT_PERIOD_MIN:
             self._start(now)
 
     def progress(self, now: float, *, complete: bool) -> None:

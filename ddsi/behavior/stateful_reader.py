@@ -158,11 +158,13 @@ class StatefulReader:
         number = change.sequence_number
         if number < proxy.next_sn:
             return 0
-        lost = number - proxy.next_sn if proxy.last_seq else 0
+        is_first = proxy.last_seq == 0
+        lost = proxy.reorder.skip_to(number)  # what a GAP named is no loss
+        proxy.reorder.head()
         proxy.last_seq = number
         proxy.reorder.next_sn = number + 1
         self.history.add(change, now)
-        return lost
+        return 0 if is_first else lost
 
     def _receive_reliable(self, proxy: WriterProxy, change: CacheChange, now: float) -> None:
         number = change.sequence_number

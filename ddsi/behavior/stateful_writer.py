@@ -19,7 +19,7 @@ from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
-from .filtered import directed_heartbeat_range, gap_before, gap_for, is_irrelevant
+from .filtered import directed_heartbeat_range, gap_for, is_irrelevant
 from .reader_proxy import ReaderProxy
 from .schedules import HeartbeatSchedule
 from .send_window import SendWindow
@@ -30,11 +30,10 @@ __all__ = ["StatefulWriter"]
 
 _STALLED_AFTER_S = 0.5
 _PACE_S = 0.001
-_MAX_FILTERED_SAMPLES_PER_READER = 256
 
 
 class StatefulWriter:
-    """One local writer.  ``filters``: its changes have destinations (see :mod:`ddsi.behavior.filtered`)."""
+    """One local writer, whose changes are for all its readers.  Where they are not: FilteringWriter."""
 
     def __init__(
         self,
@@ -43,13 +42,11 @@ class StatefulWriter:
         *,
         fragment_octets: int,
         unacknowledged_octets_max: int,
-        filters: bool = False,
     ) -> None:
         """``fragment_octets``: payloads larger than this travel in fragments of this size."""
         self.guid = guid
         self.qos = qos
         self.cache = WriterHistoryCache(qos)
-        self.filters = filters
         self.fragment_octets = fragment_octets
         self.is_reliable = qos.is_reliable
         self.readers: dict[Guid, ReaderProxy] = {}
@@ -96,11 +93,6 @@ class StatefulWriter:
                 return f"{waiting} octets are not acknowledged (bound {self._unacknowledged_octets_max})"
         return None
 
-    def has_overflow(self, destination: Guid) -> bool:
-        """Filtered writers: does this destination hold more unacknowledged samples than one may?"""
-        count = sum(change.destination == destination for change in self.cache.changes())
-        return count >= _MAX_FILTERED_SAMPLES_PER_READER
-
     def new_change(
         self,
         kind: ChangeKind,
@@ -145,7 +137,7 @@ class StatefulWriter:
         """
         sequence_number = change.sequence_number
         size = len(change.payload)
-        if self.next_unsent_sn != sequence_number or self.filters or size > self.fragment_octets:
+        if self.next_unsent_sn != sequence_number or size > self.fragment_octets:
             return False
         if self._reliable_readers:
             if self._in_flight_octets >= self.window.octets:
@@ -165,11 +157,7 @@ class StatefulWriter:
         acked = self.next_unsent_sn - 1 if self.readers else self.cache.last_sn
         for proxies in (self.readers, self.local_readers):
             for proxy in proxies.values():
-                if (
-                    proxy.is_reliable
-                    and proxy.acked_sn < acked
-                    and not (self.filters and proxy.acked_sn >= proxy.lst_seq)
-                ):
+                if proxy.is_reliable and proxy.acked_sn < acked:
                     acked = proxy.acked_sn
         return acked
 
@@ -181,11 +169,12 @@ class StatefulWriter:
         """RTPS 2.5 §8.4.7.3.1.  A reliable reader is told at once what there is, lest it waits or asks."""
         proxy = ReaderProxy(data, locators, history_sn=self._history_sn_for(data, self.next_unsent_sn - 1), now=now)
         proxy.match_sn = self.next_unsent_sn - 1
+        self._proxy_added(proxy)
         self.readers[data.guid] = proxy
         self._matched_readers_changed()
         if not (self.is_reliable and proxy.is_reliable):
             return []
-        if proxy.acked_sn < self.next_unsent_sn - 1:
+        if self._lags(proxy):
             self.heartbeat.written(now)
         return [self.directed_heartbeat(proxy)]
 
@@ -197,12 +186,11 @@ class StatefulWriter:
 
     def matched_reader_remove(self, guid: Guid, now: float) -> None:
         """RTPS 2.5 §8.4.7.3.3.  What only this reader lacked counts as acknowledged from now on."""
-        self.local_readers.pop(guid, None)
-        proxy = self.readers.pop(guid, None)
-        if proxy is not None and self.filters:
-            self._forget_destination(proxy)
-        self._matched_readers_changed()
-        self._acknowledged(now)
+        proxy = self.local_readers.pop(guid, None) or self.readers.pop(guid, None)
+        if proxy is not None:
+            self._proxy_removed(proxy)
+            self._matched_readers_changed()
+            self._acknowledged(proxy, now)
 
     def matched_reader_update(self, guid: Guid, data: DiscoveredReaderData, locators: tuple[Locator, ...]) -> None:
         """The reader announced itself anew, perhaps from elsewhere."""
@@ -223,31 +211,21 @@ class StatefulWriter:
             change = self.cache.get(self.next_unsent_sn)
             if change is None or not self.readers:
                 self._advance_unsent()
-            elif self.filters:
-                out.extend(self._send_to_destinations(change))
-                self._advance_unsent()
-            elif self._window_is_full() or self._pace_due != math.inf:
-                break
-            elif len(change.payload) <= self.fragment_octets:
-                out.append(SendData(change))
-                self._sent(change)
             else:
-                out.extend(self._send_fragments(change, now))
+                transmissions = self._transmit(change, now)
+                if not transmissions and self.next_unsent_sn == change.sequence_number:
+                    break
+                out.extend(transmissions)
         return out
 
-    def _send_to_destinations(self, change: CacheChange) -> list[WriterTransmission]:
-        """The filtered path: the sample to each reader it is meant for, after a GAP for what was not."""
-        out: list[WriterTransmission] = []
-        for proxy in self.readers.values():
-            if not proxy.is_relevant(change) or change.sequence_number <= proxy.history_sn:
-                continue
-            gap = gap_before(proxy, change) if proxy.is_reliable else None
-            if gap is not None:
-                out.append(gap)
-            out.extend(self._whole_change(change, proxy))
-            proxy.lst_seq = change.sequence_number
-            out.append(self.directed_heartbeat(proxy))
-        return out
+    def _transmit(self, change: CacheChange, now: float) -> list[WriterTransmission]:
+        """The first transmission of a change, or the next part of it; nothing when it has to wait."""
+        if self._window_is_full() or self._pace_due != math.inf:
+            return []
+        if len(change.payload) > self.fragment_octets:
+            return self._send_fragments(change, now)
+        self._sent(change)
+        return [SendData(change)]
 
     def _send_fragments(self, change: CacheChange, now: float) -> list[WriterTransmission]:
         """The next burst of a large change: as much as the window; the rest follows a moment later.
@@ -297,7 +275,7 @@ class StatefulWriter:
 
     def piggyback_heartbeat(self) -> SendHeartbeat | None:
         """The HEARTBEAT that rides behind fresh samples; it asks for an answer when the window fills up."""
-        if not self._reliable_readers or self.filters:
+        if not self._reliable_readers:
             return None
         final = self._in_flight_octets * 2 < self.window.octets
         return self._heartbeat(None, final=final)
@@ -314,9 +292,8 @@ class StatefulWriter:
 
     def directed_heartbeat(self, proxy: ReaderProxy) -> SendHeartbeat:
         """A HEARTBEAT to one reader, about what concerns it; final when it has everything."""
-        last_sent = self.cache.last_sn if self.filters else self.next_unsent_sn - 1
-        if not self.filters:
-            proxy.lst_seq = max(proxy.lst_seq, last_sent)
+        last_sent = self.next_unsent_sn - 1
+        proxy.lst_seq = max(proxy.lst_seq, last_sent)
         first, last = directed_heartbeat_range(self.cache, proxy, last_sent)
         self._heartbeat_count += 1
         return SendHeartbeat(first, last, self._heartbeat_count, proxy.acked_sn >= proxy.lst_seq, (proxy,))
@@ -329,19 +306,16 @@ class StatefulWriter:
         self._heartbeat_count += 1
         return SendHeartbeat(first, last, self._heartbeat_count, final, readers, liveliness)
 
+    def _lags(self, proxy: ReaderProxy) -> bool:
+        """Was it sent something that it has not acknowledged?"""
+        return proxy.is_reliable and proxy.acked_sn < self.next_unsent_sn - 1
+
     def _lagging_readers(self) -> list[ReaderProxy]:
-        last_sent = self.next_unsent_sn - 1
-        return [
-            proxy
-            for proxy in self.readers.values()
-            if proxy.is_reliable and proxy.acked_sn < (proxy.lst_seq if self.filters else last_sent)
-        ]
+        return [proxy for proxy in self.readers.values() if self._lags(proxy)]
 
     def _heartbeats_for(self, lagging: list[ReaderProxy]) -> list[WriterTransmission]:
         if not lagging:
             return []
-        if self.filters:
-            return [self.directed_heartbeat(proxy) for proxy in lagging]
         readers = None if len(lagging) == len(self.readers) else tuple(lagging)
         return [self._heartbeat(readers, final=False)]
 
@@ -398,11 +372,11 @@ class StatefulWriter:
         proxy.progress_time = now
         was_stalled, proxy.is_stalled = proxy.is_stalled, False
         if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:
-            self._acknowledged(now)
+            self._acknowledged(proxy, now)
         out = self._requested_changes(proxy, requested, now) if requested else []
-        if not final or (out and not self.filters) or (out and proxy.acked_sn < proxy.lst_seq):
+        if not final or (out and proxy.acked_sn < proxy.lst_seq):
             out.append(self.directed_heartbeat(proxy))
-        if proxy.acked_sn < self.next_unsent_sn - 1 and self.heartbeat.due == math.inf:
+        if self._lags(proxy):
             self.heartbeat.written(now)
         out.extend(self.unsent_changes(now))
         return out
@@ -440,7 +414,7 @@ class StatefulWriter:
         self, proxy: ReaderProxy, sequence_number: int, missing: NumberSet, count: int, now: float
     ) -> list[WriterTransmission]:
         """NACK_FRAG: some fragments of one change are missing.  RTPS 2.5 §8.3.8.10, §8.4.14.1."""
-        if not proxy.accepts_nack_frag(count):
+        if not proxy.accepts_nack_frag(count, now):
             return []
         proxy.progress_time = now
         change = self.cache.get(sequence_number)
@@ -462,18 +436,25 @@ class StatefulWriter:
     def local_reader_progress(self, proxy: ReaderProxy, acked_sn: int, now: float) -> None:
         """A reader of this participant took what was handed to it."""
         if proxy.acked_changes_set(acked_sn):
-            self._acknowledged(now)
+            self._acknowledged(proxy, now)
 
-    def _acknowledged(self, now: float) -> None:
+    def _acknowledged(self, proxy: ReaderProxy, now: float) -> None:
         """Somebody acknowledged more, or left: free what nobody needs, and let the window slide."""
-        if self.filters:
-            self._free_acknowledged_destinations()
-        else:
-            self.cache.acknowledged_up_to(self.min_acked_sn())
+        self._free_acknowledged(proxy)
         self._drain_in_flight()
         # What was not sent yet is lacked by all: a local reader takes a change before it leaves for the others.
         all_sent = self.next_unsent_sn > self.cache.last_sn
         self.heartbeat.progress(now, complete=all_sent and not self._lagging_readers())
+
+    def _free_acknowledged(self, proxy: ReaderProxy) -> None:
+        """This reader has more than before, or is gone."""
+        self.cache.acknowledged_up_to(self.min_acked_sn())
+
+    def _proxy_added(self, proxy: ReaderProxy) -> None:
+        """A reader is about to be matched."""
+
+    def _proxy_removed(self, proxy: ReaderProxy) -> None:
+        """A reader is matched no more."""
 
     def _drain_in_flight(self) -> None:
         acked = min(
@@ -490,22 +471,6 @@ class StatefulWriter:
             freed += in_flight.popleft()[1]
         self._in_flight_octets -= freed
         self.window.acknowledged(freed)
-
-    def _free_acknowledged_destinations(self) -> None:
-        """Filtered: a change goes when the readers it is for have it; the others' acknowledgments mean nothing."""
-        for change in self.cache.changes():
-            number = change.sequence_number
-            waiting = any(
-                proxy.is_reliable and number > proxy.acked_sn and proxy.is_relevant(change)
-                for proxy in self.readers.values()
-            )
-            if not waiting and number < self.next_unsent_sn:
-                self.cache.remove(number)
-
-    def _forget_destination(self, proxy: ReaderProxy) -> None:
-        for change in self.cache.changes():
-            if change.destination in (proxy.guid, proxy.participant_guid):
-                self.cache.remove(change.sequence_number)
 
     def _history_sn_for(self, data: DiscoveredReaderData, sent_sn: int) -> int:
         """The highest number that a reader matched now must not get: all sent so far, unless both sides keep history.

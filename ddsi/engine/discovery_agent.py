@@ -257,6 +257,7 @@ class DiscoveryAgent:
             writer = engine.local_writers[Guid.of(engine.guid.prefix, topic.writer_id)]
             writer.behavior.matched_reader_remove(Guid.of(proxy.prefix, topic.reader_id), now)
             writer.receivers = tuple(writer.behavior.readers)
+            engine.writer_answers(writer, writer.behavior.unsent_changes(now))  # the window may have waited for it
             reader = engine.local_readers[Guid.of(engine.guid.prefix, topic.reader_id)]
             engine.matchmaker.detach_writer(reader, Guid.of(proxy.prefix, topic.writer_id), now)
         del engine.participants[proxy.prefix]

@@ -125,6 +125,7 @@ class LocalReader:
     history: ReaderHistoryCache | None
     keys: KeyCodec | None
     guid: Guid = field(init=False)
+    uses_filter: bool = False
     protection: ProtectedEndpoint = ProtectedEndpoint()
     matched: SubscriptionMatched = SubscriptionMatched()
     incompatible: RequestedIncompatibleQos = RequestedIncompatibleQos()

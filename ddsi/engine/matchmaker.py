@@ -189,8 +189,6 @@ class Matchmaker:
         participant: ParticipantProxy | None,
         locators: tuple[Locator, ...],
         now: float,
-        *,
-        uses_filter: bool = False,
     ) -> None:
         """Enter the pair into the tables that datagrams are looked up in; builtin endpoints come here directly."""
         engine = self._engine
@@ -202,7 +200,7 @@ class Matchmaker:
                 keeps_lowest=data.qos.is_reliable,
             )
             remote = engine.remote_writers[data.guid] = RemoteWriter(data, defragmenter, participant)
-        proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=uses_filter)
+        proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=reader.uses_filter)
         remote.readers.append((reader.behavior, proxy))
         remote.readers_changed()
         engine.proxy_touched(reader.behavior, proxy)

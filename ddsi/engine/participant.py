@@ -20,6 +20,7 @@ from random import Random
 from typing import TYPE_CHECKING, TypeVar
 
 from ..behavior.defrag import DefragBudget
+from ..behavior.filtering_writer import FilteringWriter
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
@@ -45,7 +46,7 @@ from ..structure.vendor import PROTOCOL_VERSION
 from ..trace.reasons import DropReason, LossReason, SampleLossReason
 from .alarms import Alarms
 from .discovery_agent import DiscoveryAgent
-from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, StatusChanged, WriterProgress
+from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
 from .inbound import Inbound
 from .liveliness import Liveliness
 from .local_endpoints import KeyCodec, LocalReader, LocalWriter
@@ -152,7 +153,8 @@ class Participant:
         self.defrag_budget = DefragBudget(setup.config.max_defrag_octets)
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
         self._max_message_octets = setup.max_message_octets
-        self.outbound = Outbound(header, setup.max_message_octets, hooks, self._effects.append)
+        emit = self._emit_recorded if self.recorder.is_on else self._effects.append
+        self.outbound = Outbound(header, setup.max_message_octets, hooks, emit)
         self.inbound = Inbound(self)
         self.matchmaker = Matchmaker(self)
         self.liveliness = Liveliness(self)
@@ -188,7 +190,7 @@ class Participant:
 
     def next_deadline(self) -> float:
         """When :meth:`handle_timeout` is wanted at the latest, in engine seconds; ``math.inf`` for never."""
-        return self.alarms.next_deadline()
+        return math.inf if self._is_closed else self.alarms.next_deadline()
 
     def drain_effects(self) -> list[Effect]:
         """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
@@ -211,13 +213,14 @@ class Participant:
         """Is anything to be done at once?  Queued samples do not count until their message is full or due."""
         return bool(self._effects)
 
+    def _emit_recorded(self, effect: SendDatagram) -> None:
+        self.recorder.sent(effect)
+        self._effects.append(effect)
+
     def flush(self) -> None:
         """Send what is queued: several small samples may have been waiting for each other."""
         if not self.outbound.is_idle:
-            sent = len(self._effects)
             self.outbound.flush()
-            if self.recorder.is_on:
-                self.recorder.sent(self._effects[sent:])
         if self._flush_armed:
             self._flush_armed = False
             self.alarms.flush(math.inf)
@@ -263,8 +266,12 @@ class Participant:
         is_keyed: bool,
         keys: KeyCodec | None = None,
         type_information: bytes = b"",
+        uses_filter: bool = False,
     ) -> LocalReader:
-        """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then."""
+        """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then.
+
+        ``uses_filter``: its writers send each reader its own changes only, so that skipped numbers are no loss.
+        """
         self.now = now
         kind = EntityKind.READER_WITH_KEY if is_keyed else EntityKind.READER_NO_KEY
         data = DiscoveredReaderData(
@@ -285,6 +292,7 @@ class Participant:
         reader = self._add_reader(data, history, keys)
         reader.behavior.history = self.recorder.delivering(guid, history)
         reader.protection = protection
+        reader.uses_filter = uses_filter
         self._readers_by_topic.setdefault(topic_name, {})[guid] = reader
         self.recorder.endpoint_created(data)
         self.discovery.announce_reader(data, now)
@@ -531,10 +539,7 @@ class Participant:
         self.status(guid, self.local_readers[guid].sample_rejected(reason))
 
     def send_spdp(self, submessage: bytes, destinations: tuple[Locator, ...]) -> None:
-        sent = len(self._effects)
         self.outbound.send_plain((submessage,), destinations)
-        if self.recorder.is_on:
-            self.recorder.sent(self._effects[sent:])
 
     def wall_ticks(self) -> int:
         """The wall clock in ticks."""
@@ -577,11 +582,7 @@ class Participant:
         for effect in self.hooks.drain_effects():
             match effect:
                 case SendMessage(writer_id, change):
-                    writer = self.local_writers[Guid.of(self.guid.prefix, writer_id)]
-                    self.write(
-                        writer, change.kind, bytes(change.payload), change.key, self.now, destination=change.destination
-                    )
-                    self.flush()
+                    self._send_generic_message(self.local_writers[Guid.of(self.guid.prefix, writer_id)], change)
                 case HookCompute():
                     asked = effect
                     self._effects.append(
@@ -590,6 +591,15 @@ class Participant:
                 case Decided():
                     self._decided(effect, self.now)
         self.alarms.security(self.hooks.next_deadline())
+
+    def _send_generic_message(self, writer: LocalWriter, change: CacheChange) -> None:
+        """What the hooks have to tell another participant; one that never acknowledges is given up."""
+        destination, behavior = change.destination, writer.behavior
+        if isinstance(behavior, FilteringWriter) and behavior.has_overflow(destination):
+            self.discovery.participant_lost(destination, LossReason.UNRESPONSIVE, self.now)
+            return
+        self.write(writer, change.kind, bytes(change.payload), change.key, self.now, destination=destination)
+        self.flush()
 
     def _decided(self, effect: Decided, now: float) -> None:
         if effect.local != self.guid:
@@ -608,7 +618,7 @@ class Participant:
 
     def _add_writer(self, data: DiscoveredWriterData, *, filters: bool = False) -> LocalWriter:
         overhead = self.hooks.overhead(data.guid, ())
-        behavior = StatefulWriter(
+        behavior = (FilteringWriter if filters else StatefulWriter)(
             data.guid,
             data.qos,
             fragment_octets=fragment_octets_for(
@@ -617,7 +627,6 @@ class Participant:
                 overhead.payload + overhead.submessage + overhead.message,
             ),
             unacknowledged_octets_max=self.config.unacknowledged_octets,
-            filters=filters,
         )
         writer = self.local_writers[data.guid] = LocalWriter(data, behavior, self.outbound.new_packer())
         return writer

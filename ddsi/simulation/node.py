@@ -185,10 +185,19 @@ class Node:
         return writer
 
     def reader(
-        self, topic: str = "Square", qos: Qos = Qos(), *, keyed: bool = False, takes: bool = True, type_name: str = "T"
+        self,
+        topic: str = "Square",
+        qos: Qos = Qos(),
+        *,
+        keyed: bool = False,
+        takes: bool = True,
+        uses_filter: bool = False,
+        type_name: str = "T",
     ) -> NodeReader:
         keys = SIMULATED_KEYS if keyed else None
-        local = self.engine.create_reader(topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys)
+        local = self.engine.create_reader(
+            topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys, uses_filter=uses_filter
+        )
         reader = NodeReader(self, local, self._books.books[local.guid], takes=takes)
         self.readers.append(reader)
         self.pump()

@@ -1,0 +1,180 @@
+"""FilteringWriter: a writer whose changes have destinations; each reader gets its own, and a GAP for all others.
+
+DDS-Security 1.1 §7.4.4 (BuiltinParticipantVolatileMessageSecure), RTPS 2.5 §8.4.7.5 (DDS_FILTER).  The mechanism is
+told in :mod:`ddsi.behavior.filtered`; this is its writer's side.  It differs from a StatefulWriter in this:
+
+- a change goes to the readers that it :meth:`~ddsi.behavior.reader_proxy.ReaderProxy.is_relevant` for, each time to one
+  reader, behind the GAP that explains the numbers between;
+- ``lst_seq`` says how far that reader was sent something, and every HEARTBEAT is directed and speaks of that alone.  It
+  stops when the reader has acknowledged ``lst_seq``, whatever the others lack;
+- a change is kept until the readers it is for have it.  Who does not answer fills up his own share of the history,
+which is
+  bounded, and never the others' (:meth:`FilteringWriter.has_overflow`).
+"""
+
+from __future__ import annotations
+
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.guid import GUID_UNKNOWN, Guid
+from ..structure.qos import EndpointQos
+from .filtered import gap_before
+from .reader_proxy import ReaderProxy
+from .stateful_writer import StatefulWriter
+from .transmissions import SendHeartbeat, WriterTransmission
+
+__all__ = ["MAX_CHANGES_PER_DESTINATION", "FilteringWriter"]
+
+MAX_CHANGES_PER_DESTINATION = 256
+"""What one destination may leave unacknowledged; a handshake and its keys take less than ten."""
+
+
+class FilteringWriter(StatefulWriter):
+    """The history is KEEP_ALL, as a change for one reader must not push out another's."""
+
+    def __init__(self, guid: Guid, qos: EndpointQos, *, fragment_octets: int, unacknowledged_octets_max: int) -> None:
+        super().__init__(
+            guid, qos, fragment_octets=fragment_octets, unacknowledged_octets_max=unacknowledged_octets_max
+        )
+        # Which numbers of the cache are for whom, ascending.  A dict serves as an ordered set.
+        self._held: dict[Guid, dict[int, None]] = {}
+
+    def lacks_room(self, octets: int, key: bytes) -> str | None:
+        """Only resource limits hold a write back: octets that one reader leaves unacknowledged are not the others'
+        affair."""
+        reason = self.cache.lacks_room(key)
+        return f"resource limit {reason}" if reason is not None else None
+
+    def has_overflow(self, destination: Guid) -> bool:
+        """Does this destination hold as many unacknowledged changes as one may?  Then it has to be given up."""
+        return len(self._held.get(destination, ())) >= MAX_CHANGES_PER_DESTINATION
+
+    def new_change(
+        self,
+        kind: ChangeKind,
+        payload: bytes,
+        key: bytes,
+        source_timestamp: int,
+        now: float,
+        *,
+        key_hash: bytes = b"",
+        destination: Guid = GUID_UNKNOWN,
+        related: tuple[Guid, int] | None = None,
+    ) -> CacheChange:
+        change = super().new_change(
+            kind, payload, key, source_timestamp, now, key_hash=key_hash, destination=destination, related=related
+        )
+        self._held.setdefault(destination, {})[change.sequence_number] = None
+        return change
+
+    def sends_directly(self, change: CacheChange) -> bool:
+        return False
+
+    # --- to each reader its own --------------------------------------------------------------------------
+
+    def _transmit(self, change: CacheChange, now: float) -> list[WriterTransmission]:
+        """The sample to each reader it is meant for, after a GAP for what was not."""
+        out: list[WriterTransmission] = []
+        for proxy in self.readers.values():
+            if not proxy.is_relevant(change) or change.sequence_number <= proxy.history_sn:
+                continue
+            is_reliable = self.is_reliable and proxy.is_reliable
+            gap = gap_before(proxy, change) if is_reliable else None
+            if gap is not None:
+                out.append(gap)
+            out.extend(self._whole_change(change, proxy))
+            proxy.lst_seq = change.sequence_number
+            if is_reliable:
+                out.append(self.directed_heartbeat(proxy))
+        self._advance_unsent()
+        return out
+
+    def piggyback_heartbeat(self) -> SendHeartbeat | None:
+        return None
+
+    def directed_heartbeat(self, proxy: ReaderProxy, *, liveliness: bool = False) -> SendHeartbeat:
+        """What is there for this reader, up to ``lst_seq``; ``first == last + 1`` when nothing is."""
+        last = proxy.lst_seq
+        wanted = [number for number in self._numbers_of(proxy) if proxy.history_sn < number <= last]
+        first = min(wanted, default=last + 1)
+        self._heartbeat_count += 1
+        return SendHeartbeat(first, last, self._heartbeat_count, proxy.acked_sn >= last, (proxy,), liveliness)
+
+    def assert_liveliness(self) -> list[WriterTransmission]:
+        reliable = [proxy for proxy in self.readers.values() if self.is_reliable and proxy.is_reliable]
+        return [self.directed_heartbeat(proxy, liveliness=True) for proxy in reliable]
+
+    def _heartbeats_for(self, lagging: list[ReaderProxy]) -> list[WriterTransmission]:
+        return [self.directed_heartbeat(proxy) for proxy in lagging]
+
+    # --- acknowledged, per reader --------------------------------------------------------------------------
+
+    def min_acked_sn(self) -> int:
+        """As if everybody who has all that was meant for him had acknowledged everything."""
+        lagging = [proxy.acked_sn for proxy in self.readers.values() if self._lags(proxy)]
+        local = [proxy.acked_sn for proxy in self.local_readers.values() if proxy.is_reliable]
+        return min([*lagging, *local, self.next_unsent_sn - 1 if self.readers else self.cache.last_sn])
+
+    def _lags(self, proxy: ReaderProxy) -> bool:
+        return proxy.is_reliable and proxy.acked_sn < proxy.lst_seq
+
+    def _proxy_added(self, proxy: ReaderProxy) -> None:
+        """A late joiner that is to have history: the highest number of it that is for this reader counts as sent."""
+        wanted = [number for number in self._numbers_of(proxy) if proxy.history_sn < number < self.next_unsent_sn]
+        proxy.lst_seq = max(wanted, default=proxy.history_sn)
+
+    def _proxy_removed(self, proxy: ReaderProxy) -> None:
+        """What was for this reader alone goes with it."""
+        for destination in (proxy.guid, proxy.participant_guid):
+            for number in list(self._held.get(destination, ())):
+                change = self.cache.get(number)
+                if change is None or not self._readers_of(change):
+                    self._drop(number, destination)
+        for number in list(self._held.get(GUID_UNKNOWN, ())):
+            self._release_number(number)
+
+    def _free_acknowledged(self, proxy: ReaderProxy) -> None:
+        """A change goes when the readers it is for have it; the others' acknowledgments mean nothing."""
+        for number in self._numbers_of(proxy):
+            if number <= proxy.acked_sn:
+                self._release_number(number)
+
+    def _advance_unsent(self) -> None:
+        change = self.cache.get(self.next_unsent_sn)
+        self.next_unsent_sn += 1
+        if change is not None:
+            self._release(change)
+
+    def _release_number(self, number: int) -> None:
+        change = self.cache.get(number)
+        if change is not None:
+            self._release(change)
+
+    def _release(self, change: CacheChange) -> None:
+        number = change.sequence_number
+        if self.cache.keeps_acknowledged or number >= self.next_unsent_sn:
+            return
+        if not any(proxy.is_reliable and proxy.acked_sn < number for proxy in self._readers_of(change)):
+            self._drop(number, change.destination)
+
+    def _drop(self, number: int, destination: Guid) -> None:
+        self.cache.remove(number)
+        numbers = self._held.get(destination)
+        if numbers is not None:
+            numbers.pop(number, None)
+            if not numbers:
+                del self._held[destination]
+
+    def _readers_of(self, change: CacheChange) -> list[ReaderProxy]:
+        proxies = (*self.readers.values(), *self.local_readers.values())
+        return [proxy for proxy in proxies if proxy.is_relevant(change)]
+
+    def _numbers_of(self, proxy: ReaderProxy) -> list[int]:
+        """The numbers in the cache that are relevant to this reader; forgets those that LIFESPAN took away."""
+        found: list[int] = []
+        for destination in (proxy.guid, proxy.participant_guid, GUID_UNKNOWN):
+            for number in list(self._held.get(destination, ())):
+                if self.cache.get(number) is not None:
+                    found.append(number)
+                else:
+                    self._drop(number, destination)
+        return found
