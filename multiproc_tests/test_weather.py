@@ -58,7 +58,7 @@ async def test_reliable_samples_all_arrive_in_a_storm(publisher: Peer, subscribe
 @async_test
 async def test_fragments_all_arrive_in_a_storm(publisher: Peer, subscriber: Peer) -> None:
     """Samples of many fragments, of which each may be lost, are completed by asking for those that are missing."""
-    await play_in_storm(publisher, subscriber, replace(PATIENT, topic="Blob", blob_octets=100_000, count=5))
+    await play_in_storm(publisher, subscriber, replace(PATIENT, topic="Blob", blob_octets=100_000, count=3))
 
 
 @async_test
