@@ -5,7 +5,6 @@ The classes of the events are imported with the first event, so a program that d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .. import trace as tracing
@@ -16,7 +15,7 @@ from ..structure.discovered import DiscoveredEndpointData, DiscoveredParticipant
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..trace.reasons import DropReason, LossReason, SampleLossReason
-from .effects import Effect, SendDatagram
+from .effects import SendDatagram
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
@@ -66,10 +65,8 @@ class Recorder:
     def received(self, source: Locator, octets: Octets) -> None:
         self._put("MessageReceived", source, bytes(octets))
 
-    def sent(self, effects: Sequence[Effect]) -> None:
-        for effect in effects:
-            if isinstance(effect, SendDatagram):
-                self._put("MessageSent", effect.destinations, b"".join(effect.parts))
+    def sent(self, effect: SendDatagram) -> None:
+        self._put("MessageSent", effect.destinations, b"".join(effect.parts))
 
     def dropped(self, reason: DropReason, source: Locator | None, detail: str) -> None:
         self._put("Dropped", reason, source, detail)
