@@ -173,7 +173,7 @@ async def test_every_wait_can_be_cancelled_and_repeated(domain: int) -> None:
         waits: list[Callable[[], Awaitable[Any]]] = [
             lambda: writer.wait_for_matched(2),
             lambda: reader.wait_for_matched(2),
-            lambda: reader.wait(),
+            reader.wait,
             lambda: anext(reader),
             lambda: anext(participant.events()),
             participant.wait_for_discovery,

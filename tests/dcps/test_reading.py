@@ -70,11 +70,10 @@ async def test_iteration_ends_when_the_participant_ends(domain: int) -> None:
             pass
         ended.append(True)
 
-    async with trio.open_nursery() as nursery:
-        async with ddsi.DomainParticipant(domain) as participant:
-            reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Square", Shape))
-            nursery.start_soon(iterate, reader)
-            await trio.sleep(0.01)
+    async with trio.open_nursery() as nursery, ddsi.DomainParticipant(domain) as participant:
+        reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Square", Shape))
+        nursery.start_soon(iterate, reader)
+        await trio.sleep(0.01)
     assert ended == [True]
 
 

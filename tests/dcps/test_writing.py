@@ -107,8 +107,7 @@ async def test_a_write_that_waits_goes_on_when_the_reader_takes(domain: int) -> 
 async def test_keep_all_without_limits_is_bounded_by_the_octets_not_acknowledged(domain: int) -> None:
     """Nobody takes: the reader fills up to its own bound, the writer to its, and then write waits."""
     impatient = RELIABLE | ddsi.Qos(reliability=ddsi.Reliable(max_blocking_time=0.1))
-    bounds = {"unacknowledged_octets": 20_000, "reader_octets": 10_000}
-    async with pair(domain, kind=Note, writer=impatient, **bounds) as p:
+    async with pair(domain, kind=Note, writer=impatient, unacknowledged_octets=20_000, reader_octets=10_000) as p:
         written = 0
         with pytest.raises(ddsi.DdsTimeout, match="bound 20000"):
             while written < 100:
