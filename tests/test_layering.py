@@ -62,7 +62,7 @@ _CONFINED: list[tuple[set[str], tuple[str, ...]]] = [
     ({"config", "cli"}, ("os.environ", "os.getenv")),
     # what only an extra brings, or only few programs need
     ({SECURITY}, ("cryptography", "lxml")),
-    ({"cli"}, ("rich",)),
+    ({"cli"}, ("rich", "cyclonedds")),
     ({"xtypes"}, ("numpy",)),
     ({"storage"}, ("sqlite3",)),
 ]
