@@ -204,9 +204,10 @@ class DataReader(Entity, Generic[T]):
         DDS 1.4 §2.2.2.5.3.31.  Returns at once where no matched writer keeps history.
         """
         self._check_open()
-        with deadline_scope(timeout):
-            self._pump.before_waiting()
-            await trio.lowlevel.checkpoint()
+        scope = deadline_scope(timeout)
+        self._pump.before_waiting()
+        await trio.lowlevel.checkpoint()
+        with scope:
             # Looked at now and then: a HEARTBEAT that says "there was nothing" is no news for anybody else.
             while not all(proxy.has_historical_data for proxy in self._reader.behavior.writers.values()):
                 await trio.sleep(_LOOK_FOR_HISTORY_S)
