@@ -192,7 +192,8 @@ class Pump:
         """Woken by the first write of a burst; runs when the writing task yields."""
         while True:
             await self._flusher.park()
-            self.settle()
+            if self._flush_wanted:  # not flushed meanwhile by somebody who had to wait
+                self.settle()
 
     @trio.lowlevel.enable_ki_protection
     async def _send_backlog(self) -> None:
@@ -216,29 +217,26 @@ class Pump:
         if self.is_closed:
             return
         self._flush_wanted = False
-        for effect in self.engine.drain_effects():
+        self._act_on(self.engine.drain_effects())
+        self._rearm()
+
+    def written(self) -> None:
+        """After a write: act at once on what is finished, and leave the rest for when the task yields.
+
+        The flusher runs then, so the engine's own deadline for what is queued need not be armed.
+        """
+        if self.engine.has_effects:
+            self._act_on(self.engine.take_finished())
+        if not self._flush_wanted:
+            self._flush_wanted = True
+            self._flusher.unpark_all()
+
+    def _act_on(self, effects: list[Effect]) -> None:
+        for effect in effects:
             if isinstance(effect, SendDatagram):
                 self._send(effect)
             elif isinstance(effect, Compute):
                 self._start_job(effect)
-            else:
-                self._on_effect(effect)
-        self._rearm()
-
-    def written(self) -> None:
-        """After a write: act at once on what is finished, and leave the rest for when the task yields."""
-        if self.engine.has_effects:
-            self.settle_finished()
-        if not self._flush_wanted:
-            self._flush_wanted = True
-            self._flusher.unpark_all()
-            self._rearm()
-
-    def settle_finished(self) -> None:
-        """As :meth:`settle`, but messages that are not full stay open."""
-        for effect in self.engine.take_finished():
-            if isinstance(effect, SendDatagram):
-                self._send(effect)
             else:
                 self._on_effect(effect)
 
