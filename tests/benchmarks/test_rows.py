@@ -1,4 +1,4 @@
-"""Rows of every theme run on our side, with hardly any samples.  No figure is looked at: speed is not a test's business."""
+"""Rows of every theme run on our side, with hardly any samples.  No figure is looked at: speed is not tested."""
 
 from __future__ import annotations
 
