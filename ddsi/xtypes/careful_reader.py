@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from ..structure.errors import MalformedSample
-from .defaults import default_value, elements_value
+from .defaults import default_cost, default_value, elements_value, zero_cost
 from .enumerations import bitmask_from
 from .layout import Encoding, encapsulations, first_alignment, has_dheader
 from .model import (
@@ -45,6 +45,10 @@ PID_IGNORE = 0x3F03
 _MOST_DEPTH = 2 * StructType.MAX_DEPTH
 """Counts every struct, where generated code counts the recursive ones only."""
 
+_MOST_DEFAULTED = 1 << 20
+"""Default values made for one sample, beyond those of one sample without any members.  Four octets (a delimiter of 0)
+may stand for a struct whose defaults fill megabytes, and a payload may hold many of them."""
+
 
 def read_carefully(type_: StructType, payload: bytes | bytearray | memoryview) -> Any:
     """The sample in a payload that begins with its encapsulation header.  Raises MalformedSample, nothing else."""
@@ -64,6 +68,8 @@ class _CarefulReader:
         self._origin = 4
         self._end = len(payload)
         self._depth = 0
+        self._defaulted = 0
+        self._most_defaulted = _MOST_DEFAULTED + min(zero_cost(type_), 64 * _MOST_DEFAULTED)
         if self._end < 4:
             self.fail("no encapsulation header")
         self._encoding = self._encapsulation()
@@ -256,14 +262,20 @@ class _CarefulReader:
     def _construct(self, type_: StructType, values: dict[str, Any]) -> Any:
         value = object.__new__(type_.python_class)
         for member in (*type_.members, *type_.omitted):
-            given = values[member.name] if member.name in values else default_value(member)
-            setattr(value, member.name, given)
+            setattr(value, member.name, values[member.name] if member.name in values else self._default(member))
         if hasattr(value, "__post_init__"):
             try:
                 value.__post_init__()
             except Exception as error:
                 self.fail(f"{type_.python_class.__name__}.__post_init__ refused the sample: {error}")
         return value
+
+    def _default(self, member: Member) -> Any:
+        """The default of a member that the sample leaves out, if the sum of all these is within bounds."""
+        self._defaulted += default_cost(member)
+        if self._defaulted > self._most_defaulted:
+            self.fail(f"too much is left out: {member.name} and others would need {self._defaulted} default values")
+        return default_value(member)
 
     def _plain_member(self, member: Member) -> Any:
         if not member.is_optional:

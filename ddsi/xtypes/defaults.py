@@ -22,7 +22,7 @@ from .model import (
     StructType,
 )
 
-__all__ = ["default_value", "elements_value", "zero_value"]
+__all__ = ["default_cost", "default_value", "elements_value", "zero_cost", "zero_value"]
 
 
 def default_value(member: Member) -> Any:
@@ -53,6 +53,24 @@ def zero_value(type_: IdlType) -> Any:
             for member in (*type_.members, *type_.omitted):
                 setattr(value, member.name, default_value(member))
             return value
+
+
+def default_cost(member: Member) -> int:
+    """About how many Python values :func:`default_value` makes."""
+    return 1 if member.default is not None or member.is_optional else zero_cost(member.type)
+
+
+def zero_cost(type_: IdlType) -> int:
+    """About how many Python values :func:`zero_value` makes: large where arrays are, or structs multiply."""
+    match type_:
+        case ArrayType():
+            return 1 + type_.count * zero_cost(type_.element)
+        case StructType():
+            if type_.zero_cost is None:
+                type_.zero_cost = 1 + sum(default_cost(member) for member in (*type_.members, *type_.omitted))
+            return type_.zero_cost
+        case _:
+            return 1
 
 
 def elements_value(type_: SequenceType | ArrayType, elements: list[Any]) -> Any:

@@ -202,6 +202,7 @@ class StructType:
         "python_class",
         "static_sizes",
         "type_name",
+        "zero_cost",
     )
 
     MAX_DEPTH: ClassVar[int] = 64
@@ -224,6 +225,7 @@ class StructType:
         self.omitted = omitted
         self._resolve = resolve
         self._members: tuple[Member, ...] | None = None
+        self.zero_cost: int | None = None  # what ``defaults.zero_cost`` found
         self.static_sizes: dict[Any, int | None] = {}  # what ``layout.static_size`` found
 
     @property

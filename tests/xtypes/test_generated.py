@@ -152,7 +152,7 @@ def test_members_may_be_named_like_anything_in_the_generated_code() -> None:
         Struct: idl.sequence[str]
         len: idl.int32
         bytes: bytes
-        __private: idl.int32 = 3
+        _private: idl.int32 = 3
 
     sample = Names(1, "d", [2], "new", ["s"], 4, b"5")
     assert deserialize(Names, serialize(sample)) == sample

@@ -100,6 +100,27 @@ def test_breadth_is_read_in_linear_time() -> None:
     assert time.perf_counter() - began < 5  # some 0.3 s; a quadratic reader would take minutes
 
 
+def test_defaults_cannot_be_multiplied() -> None:
+    """Each delimiter of 0 stands for an element of which all is default, here a million values."""
+
+    @idl.struct
+    class Tile:
+        pixels: Annotated[idl.sequence[idl.uint16], idl.array(1000, 1000)]
+
+    @idl.struct
+    class Image:
+        tiles: idl.sequence[Tile]
+        one: Tile
+
+    def payload(count: int) -> bytes:
+        body = struct.pack("<II", 4 + 4 * count, count) + bytes(4 * count)
+        return b"\0\x09\0\0" + struct.pack("<I", len(body)) + body
+
+    assert len(deserialize(Image, payload(1)).one.pixels) == 1000
+    with pytest.raises(MalformedSample, match=r"tiles\[2\]: too much is left out: pixels and others"):
+        deserialize(Image, payload(10_000))
+
+
 DELIMITERS = [
     ("00090000 ffffffff 00000000", "a length of 4294967295 octets where 4 are left"),
     ("00090000 08000000 00000000 00000000", "kids: 4 octets are needed, 0 are left"),
