@@ -29,7 +29,7 @@ from .terminal import can_print, terminal_width, uses_colour
 from .trace_source import TraceSource
 from .trace_text import TraceText
 
-__all__ = ["SUMMARY", "add_arguments", "run"]
+__all__ = ["SUMMARY", "add_arguments", "categories", "run"]
 
 SUMMARY = "watch or record what goes over the wire, or draw a recording"
 
@@ -56,13 +56,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--limit", type=count, metavar="N", help="at most so many events of FILE")
     drawing = parser.add_argument_group("drawing")
     drawing.add_argument("--text", action="store_true", help="a line for each event instead of a sequence diagram")
-    drawing.add_argument("--only", type=_categories, default=DEFAULT_CATEGORIES, metavar="NAMES",
+    drawing.add_argument("--only", type=categories, default=DEFAULT_CATEGORIES, metavar="NAMES",
                          help=f"categories, of {', '.join(Category)}; default: all but timer")  # fmt: skip
     drawing.add_argument("--ascii", action="store_true", help="no box drawing")
     drawing.add_argument("--width", type=count, metavar="N", help="characters of a line (default: the terminal's)")
 
 
-def _categories(text: str) -> frozenset[Category]:
+def categories(text: str) -> frozenset[Category]:
     try:
         return frozenset(Category(name) for name in text.split(","))
     except ValueError:
