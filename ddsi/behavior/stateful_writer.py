@@ -274,11 +274,17 @@ class StatefulWriter:
     # --- heartbeats --------------------------------------------------------------------------------------
 
     def piggyback_heartbeat(self) -> SendHeartbeat | None:
-        """The HEARTBEAT that rides behind fresh samples; it asks for an answer when the window fills up."""
+        """The HEARTBEAT that rides behind fresh samples: it asks for an answer when the window fills up.
+
+        There is none while little is under way and the periodic one is due anyhow: in the datagram of the samples
+        that it announces, it could only reveal losses that the samples themselves reveal.
+        """
         if not self._reliable_readers:
             return None
-        final = self._in_flight_octets * 2 < self.window.octets
-        return self._heartbeat(None, final=final)
+        is_asking = self._in_flight_octets * 2 >= self.window.octets
+        if not is_asking and self.heartbeat.due != math.inf:
+            return None
+        return self._heartbeat(None, final=not is_asking)
 
     def request_acknowledgment(self) -> list[WriterTransmission]:
         """Somebody waits for acknowledgment: ask all that lack something (final flag clear)."""

@@ -120,7 +120,7 @@ class DataWriter(Entity, Generic[T]):
             writer, ChangeKind.ALIVE, payload, key, now,
             source_timestamp=None if timestamp is None else _ticks(timestamp),
         )  # fmt: skip
-        pump.written()
+        pump.written(now)
 
     async def dispose(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
         """The instance that ``sample`` belongs to (only its key fields matter) has come to its end."""
@@ -147,7 +147,7 @@ class DataWriter(Entity, Generic[T]):
             source_timestamp=None if timestamp is None else _ticks(timestamp),
             key_hash=self._support.key_hash(key, self._representation),
         )  # fmt: skip
-        self._pump.written()
+        self._pump.written(now)
 
     async def _wait_for_room(self, octets: int, key: bytes) -> float:
         """Until one more change of so many octets may enter; returns the time.  Raises DdsTimeout."""

@@ -24,6 +24,9 @@ __all__ = ["Alarms", "Timer"]
 class Timer(Enum):
     """Keys of the timer table are a Timer alone, or (Timer, Guid...)."""
 
+    # Enum's own hash is written in Python and would be asked some ten times for each sample.
+    __hash__ = object.__hash__
+
     SPDP = "announce ourselves"
     LEASE = "a remote participant has been silent for its lease"
     WRITER = "a writer's heartbeat, pace or lifespan"
@@ -119,6 +122,7 @@ class Alarms:
             case Timer.FLUSH:
                 engine.flush()
             case Timer.SECURITY:
+                engine.hooks_timer_fired()
                 engine.hooks.handle_timeout(now)
             case _:
                 writer = engine.local_writers.get(subjects[0])

@@ -453,12 +453,14 @@ class Inbound:
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
+            due = proxy.schedule.due
             lost = local.behavior.receive_heartbeat(
                 proxy, heartbeat.first_sn, heartbeat.last_sn, heartbeat.count, incoming.now, final=heartbeat.final
             )
             if lost:
                 self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
-            self._engine.proxy_touched(local.behavior, proxy)
+            if proxy.schedule.due != due:
+                self._engine.proxy_touched(local.behavior, proxy)
         self._forget_settled(incoming, heartbeat.writer_id)
         if heartbeat.liveliness and incoming.is_for_us:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)

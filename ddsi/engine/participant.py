@@ -138,6 +138,7 @@ class Participant:
         self._effects: list[Effect] = []
         self._waiting: list[tuple[EntityId, CacheChange]] = []
         self._flush_armed = False
+        self._hooks_deadline = math.inf
         self._next_entity_key = 1
         self._is_closed = False
         self.drops: Counter[DropReason] = Counter()
@@ -578,6 +579,10 @@ class Participant:
             else:
                 self.hooks.receive_message(change, now)
 
+    def hooks_timer_fired(self) -> None:
+        """The hooks' deadline is no longer armed, whatever it was."""
+        self._hooks_deadline = math.inf
+
     def _collect_hook_effects(self) -> None:
         for effect in self.hooks.drain_effects():
             match effect:
@@ -590,7 +595,10 @@ class Participant:
                     )
                 case Decided():
                     self._decided(effect, self.now)
-        self.alarms.security(self.hooks.next_deadline())
+        deadline = self.hooks.next_deadline()
+        if deadline != self._hooks_deadline:
+            self._hooks_deadline = deadline
+            self.alarms.security(deadline)
 
     def _send_generic_message(self, writer: LocalWriter, change: CacheChange) -> None:
         """What the hooks have to tell another participant; one that never acknowledges is given up."""

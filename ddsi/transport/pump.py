@@ -39,6 +39,7 @@ _BATCH = 64
 _MAX_BACKLOG = 1024
 _OPERATIONS_BEFORE_YIELD = 64
 _SECONDS_BEFORE_YIELD = 0.001
+_BURST_S = 0.001  # writes that follow each other faster may share datagrams
 _COMPUTE_THREADS = 2
 
 
@@ -83,6 +84,8 @@ class Pump:
         self._timer_scope: trio.CancelScope | None = None
         self._flusher = trio.lowlevel.ParkingLot()
         self._flush_wanted = False
+        self._last_written = -math.inf
+        self._has_waited = False
         self._backlog: deque[tuple[SendDatagram, Locator]] = deque()
         self._backlog_waiting = trio.lowlevel.ParkingLot()
         self.dropped_at_send = 0
@@ -220,11 +223,19 @@ class Pump:
         self._act_on(self.engine.drain_effects())
         self._rearm()
 
-    def written(self) -> None:
-        """After a write: act at once on what is finished, and leave the rest for when the task yields.
+    def written(self, now: float) -> None:
+        """After a write at ``now``: a lone one leaves at once; one of a burst waits until the task yields.
 
-        The flusher runs then, so the engine's own deadline for what is queued need not be armed.
+        A write begins a burst, for all we know, unless its task waited since the write before, as those do that
+        ask and answer.  The flusher runs when the task yields, so the engine's own deadline for what is
+        queued need not be armed.
         """
+        is_lone = self._has_waited or now - self._last_written > _BURST_S
+        self._has_waited = False
+        self._last_written = now
+        if is_lone and not self._flush_wanted:
+            self.settle()
+            return
         if self.engine.has_effects:
             self._act_on(self.engine.take_finished())
         if not self._flush_wanted:
@@ -242,6 +253,7 @@ class Pump:
 
     def before_waiting(self) -> None:
         """The calling task is about to wait: nothing of its own may lie in a queue meanwhile."""
+        self._has_waited = True
         if self._flush_wanted or self.engine.has_effects:
             self.settle()
 
