@@ -75,6 +75,8 @@ class Resolver:
                 annotation = self._forward(annotation)
             elif type(annotation).__name__ == "TypeAliasType":
                 annotation = annotation.__value__
+            elif type(typing.get_origin(annotation)).__name__ == "TypeAliasType":  # as numpy's NDArray[...] is
+                annotation = typing.get_origin(annotation).__value__[typing.get_args(annotation)]
             elif isinstance(annotation, typing.NewType):
                 annotation = annotation.__supertype__
             else:

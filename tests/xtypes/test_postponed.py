@@ -36,6 +36,27 @@ UNPOSTPONED = textwrap.dedent("""
     assert deserialize(Node, serialize(node)) == node
 """)
 
+ALIASES = textwrap.dedent("""
+    from typing import Annotated
+    from ddsi.xtypes import deserialize, idl, serialize
+
+    type Name = Annotated[str, idl.bound(8)]
+    type Titled = Name
+    type Few[T] = Annotated[idl.sequence[T], idl.bound(2)]
+
+    @idl.struct
+    class Book:
+        title: Titled
+        authors: Few[Name]
+        years: Annotated[Few[idl.int16], idl.key]
+
+    assert [str(m.type) for m in Book.__idl_struct__.members] == [
+        "string<8>", "sequence<string<8>, 2>", "sequence<int16, 2>"
+    ]
+    book = Book("a", ["b"], [3])
+    assert deserialize(Book, serialize(book)) == book
+""")
+
 DEFERRED = textwrap.dedent("""
     from ddsi.xtypes import deserialize, idl, serialize
 
@@ -64,6 +85,11 @@ def test_a_module_with_postponed_annotations() -> None:
 
 def test_quoted_names_in_a_function() -> None:
     subprocess.run([sys.executable, "-c", UNPOSTPONED], cwd=ROOT, check=True, timeout=60)
+
+
+@pytest.mark.skipif(sys.version_info < (3, 12), reason="PEP 695 came with Python 3.12")
+def test_type_aliases() -> None:
+    subprocess.run([sys.executable, "-c", ALIASES], cwd=ROOT, check=True, timeout=60)
 
 
 @pytest.mark.skipif(sys.version_info < (3, 14), reason="PEP 649 came with Python 3.14")
