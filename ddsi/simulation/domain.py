@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from ddsi.config import Config
-from ddsi.discovery.matching import judge
-from ddsi.spi import PLAINTEXT, SecurityHooks
-from ddsi.trace.sink import TraceSink
-
+from ..config import Config
+from ..discovery.matching import judge
+from ..spi import PLAINTEXT, SecurityHooks
+from ..trace.sink import TraceSink
 from .dice import Dice
 from .endpoints import NodeReader, NodeWriter
 from .link import GOOD_WEATHER, LinkConditions

@@ -9,16 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ddsi.behavior.reader_history_cache import ReaderHistoryCache
-from ddsi.behavior.stateful_reader import ChangeSink
-from ddsi.behavior.writer_proxy import WriterProxy
-from ddsi.engine import KeyCodec, LocalReader, LocalWriter, Participant
-from ddsi.engine.recorder import Recorder
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.errors import MalformedSample
-from ddsi.structure.guid import GUID_UNKNOWN, Guid
-from ddsi.structure.sample_info import SampleInfo
-from ddsi.trace.sink import TraceSink
+from ..behavior.reader_history_cache import ReaderHistoryCache
+from ..behavior.stateful_reader import ChangeSink
+from ..behavior.writer_proxy import WriterProxy
+from ..engine import KeyCodec, LocalReader, LocalWriter, Participant
+from ..engine.recorder import Recorder
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.errors import MalformedSample
+from ..structure.guid import GUID_UNKNOWN, Guid
+from ..structure.sample_info import SampleInfo
+from ..trace.sink import TraceSink
 
 if TYPE_CHECKING:
     from .node import Node

@@ -14,16 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ddsi.behavior.stateful_writer import StatefulWriter
-from ddsi.engine import LocalWriter
-from ddsi.messages.fast import DATA_BODY
-from ddsi.messages.raw_submessage import SubmessageKind, iterate_submessages
-from ddsi.structure.builtin_entity_ids import SPDP_WRITER
-from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.guid import Guid
-from ddsi.structure.qos_policies import KeepAll, KeepLast
-from ddsi.structure.status import PublicationMatched
-
+from ..behavior.stateful_writer import StatefulWriter
+from ..engine import LocalWriter
+from ..messages.fast import DATA_BODY
+from ..messages.raw_submessage import SubmessageKind, iterate_submessages
+from ..structure.builtin_entity_ids import SPDP_WRITER
+from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.guid import Guid
+from ..structure.qos_policies import KeepAll, KeepLast
+from ..structure.status import PublicationMatched
 from .domain import Domain
 from .endpoints import NodeReader, NodeWriter
 from .node import Node

@@ -13,11 +13,10 @@ import heapq
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 
-from ddsi.structure.guid import GuidPrefix
-from ddsi.structure.locator import Locator
-from ddsi.trace.events import LinkDelayed, LinkDropped, LinkDuplicated
-from ddsi.trace.sink import TraceSink
-
+from ..structure.guid import GuidPrefix
+from ..structure.locator import Locator
+from ..trace.events import LinkDelayed, LinkDropped, LinkDuplicated
+from ..trace.sink import TraceSink
 from .dice import Dice
 from .link import GOOD_WEATHER, SAME_HOST, LinkConditions
 

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from ddsi.config import Config
-from ddsi.engine import (
+from ..config import Config
+from ..engine import (
     Compute,
     DataAvailable,
     DiscoveryChanged,
@@ -21,15 +21,14 @@ from ddsi.engine import (
     StatusChanged,
     WriterProgress,
 )
-from ddsi.spi import PLAINTEXT, SecurityHooks
-from ddsi.structure.guid import Guid, GuidPrefix
-from ddsi.structure.locator import Locator
-from ddsi.structure.qos import Qos, reader_qos, writer_qos
-from ddsi.structure.status import Status
-from ddsi.structure.vendor import OUR_VENDOR_ID
-from ddsi.trace.events import Remark
-from ddsi.trace.sink import TraceSink
-
+from ..spi import PLAINTEXT, SecurityHooks
+from ..structure.guid import Guid, GuidPrefix
+from ..structure.locator import Locator
+from ..structure.qos import Qos, reader_qos, writer_qos
+from ..structure.status import Status
+from ..structure.vendor import OUR_VENDOR_ID
+from ..trace.events import Remark
+from ..trace.sink import TraceSink
 from .dice import Dice
 from .endpoints import SIMULATED_KEYS, BookKeeper, NodeReader, NodeWriter
 from .network import Network, Port

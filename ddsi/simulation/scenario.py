@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from ddsi.config import Config
-from ddsi.structure.cache_change import ChangeKind
-from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import (
+from ..config import Config
+from ..structure.cache_change import ChangeKind
+from ..structure.qos import Qos
+from ..structure.qos_policies import (
     BestEffort,
     History,
     KeepAll,
@@ -23,8 +23,7 @@ from ddsi.structure.qos_policies import (
     TransientLocal,
     Volatile,
 )
-from ddsi.trace.sink import TraceSink
-
+from ..trace.sink import TraceSink
 from . import invariants
 from .dice import Dice
 from .domain import Domain
@@ -61,7 +60,7 @@ class EndpointPlan:
 
     def __str__(self) -> str:
         kind = "writer" if self.is_writer else "reader"
-        return f"{'keyed ' if self.is_keyed else ''}{kind} of {self.topic} at node {self.node}, {self.qos}"
+        return f"node {self.node}: {'keyed ' if self.is_keyed else ''}{kind} of {self.topic}, {self.qos}"
 
 
 # --- steps: each is a value, and does one thing to a run -----------------------------------------------------------
@@ -71,10 +70,16 @@ class EndpointPlan:
 class Wait:
     seconds: float
 
+    def __str__(self) -> str:
+        return f"{self.seconds} s pass"
+
 
 @dataclass(frozen=True, slots=True)
 class Create:
     endpoint: EndpointPlan
+
+    def __str__(self) -> str:
+        return str(self.endpoint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +90,9 @@ class Write:
     count: int
     size: int
 
+    def __str__(self) -> str:
+        return f"a writer (by {self.choice}) writes {self.count} samples of up to {self.size} octets"
+
 
 @dataclass(frozen=True, slots=True)
 class End:
@@ -94,12 +102,18 @@ class End:
     kind: ChangeKind
     key: int
 
+    def __str__(self) -> str:
+        return f"a writer (by {self.choice}) says {self.kind.name} of instance {self.key}"
+
 
 @dataclass(frozen=True, slots=True)
 class Delete:
     """Delete an endpoint, a writer or a reader."""
 
     choice: int
+
+    def __str__(self) -> str:
+        return f"an endpoint (by {self.choice}) is deleted"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +123,9 @@ class Restart:
     node: int
     goodbye: bool
 
+    def __str__(self) -> str:
+        return f"node {self.node}: restarts {'after a goodbye' if self.goodbye else 'after a crash'}"
+
 
 @dataclass(frozen=True, slots=True)
 class Cut:
@@ -116,6 +133,10 @@ class Cut:
 
     side: int
     seconds: float
+
+    def __str__(self) -> str:
+        numbers = [str(number) for number in range(self.side.bit_length()) if self.side >> number & 1]
+        return f"the network is cut between {', '.join(numbers)} and the others for {self.seconds} s"
 
 
 Step = Wait | Create | Write | End | Delete | Restart | Cut
