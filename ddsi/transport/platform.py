@@ -15,6 +15,7 @@ __all__ = [
     "Interface",
     "allow_shared_port",
     "bind_address_for_group",
+    "can_gather",
     "enlarge_buffer",
     "list_interfaces",
     "receive_only_joined_groups",
@@ -24,6 +25,10 @@ _ETHERNET_MTU = 1500
 _LOOPBACK_MTU = 65536
 _IFF_UP, _IFF_LOOPBACK = 0x1, 0x8
 _BUFFER_WANTED = 4 << 20
+
+
+can_gather = hasattr(socket.socket, "sendmsg")
+"""Can one datagram be sent from several buffers?  Not on Windows."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from .platform import (
     Interface,
     allow_shared_port,
     bind_address_for_group,
+    can_gather,
     enlarge_buffer,
     list_interfaces,
     receive_only_joined_groups,
@@ -208,7 +209,7 @@ class UdpTransport:
             try:
                 if len(parts) == 1:
                     sock.sendto(parts[0], address)
-                elif len(parts) > _MAX_IOV or sum(map(len, parts)) < _JOIN_BELOW:
+                elif not can_gather or len(parts) > _MAX_IOV or sum(map(len, parts)) < _JOIN_BELOW:
                     sock.sendto(b"".join(parts), address)
                 else:
                     sock.sendmsg(parts, (), 0, address)
