@@ -173,7 +173,14 @@ class UdpTransport:
         allow_shared_port(sock)
         receive_only_joined_groups(sock)
         group = self._config.multicast_address
-        sock.bind((bind_address_for_group(group), self._config.ports.metatraffic_multicast(self._domain_id)))
+        port = self._config.ports.metatraffic_multicast(self._domain_id)
+        try:
+            sock.bind((bind_address_for_group(group), port))
+        except OSError as error:
+            raise OutOfResources(
+                f"cannot listen on {group}:{port} ({error}): another program holds the port for itself; stop it, choose "
+                "another domain, or do without multicast: Config(multicast=False, peers=...)"
+            ) from error
         enlarge_buffer(sock, socket.SO_RCVBUF, self._config.receive_buffer_size)
         joined = 0
         for interface in self.interfaces:
