@@ -1,4 +1,4 @@
-"""What implementations of others cannot do, with each other or with anybody: failures that are expected and explained.
+"""What implementations of others cannot do, with each other or with us: failures that are expected and explained.
 
 A run that fails in such a way is reported as a known limit; one that passes is reported as passed, so that an entry
 that is out of date does no harm.  Nothing of ours belongs here but for what the other side alone is to blame for.

@@ -235,7 +235,11 @@ static int take_some(dds_entity_t reader)
       seen.samples++;
     }
     if (infos[i].instance_state == DDS_IST_NOT_ALIVE_DISPOSED) {
-      say_key("DISPOSED", samples[i]);
+      /* Samples that are taken after the dispose bear its state as well: it is said once for an instance.  */
+      static dds_instance_handle_t told;
+      if (told != infos[i].instance_handle)
+        say_key("DISPOSED", samples[i]);
+      told = infos[i].instance_handle;
       seen.disposed = 1;
     } else if (infos[i].instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS && !infos[i].valid_data) {
       say_key("NO-WRITERS", samples[i]);

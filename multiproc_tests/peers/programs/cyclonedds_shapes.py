@@ -171,6 +171,7 @@ class Taker:
         self.samples = self.matched = 0
         self.has_disposed = self.has_no_writers = False
         self.keys: dict[int, Any] = {}
+        self.disposed: set[int] = set()
 
     def is_complete(self) -> bool:
         o = self.options
@@ -198,7 +199,10 @@ class Taker:
             self.samples += 1
         key = self.keys.get(info.instance_handle, "?")
         if info.instance_state == InstanceState.NotAliveDisposed:
-            say("DISPOSED", key)
+            # Samples that are taken after the dispose bear its state as well: it is said once for an instance.
+            if info.instance_handle not in self.disposed:
+                say("DISPOSED", key)
+            self.disposed.add(info.instance_handle)
             self.has_disposed = True
         elif info.instance_state == InstanceState.NotAliveNoWriters and not info.valid_data:
             say("NO-WRITERS", key)
