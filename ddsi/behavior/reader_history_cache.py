@@ -37,10 +37,14 @@ SampleSelector = Callable[[SampleInfo], bool]
 
 
 class Instance:
-    """One instance: its samples (oldest first), who writes it, and its states."""
+    """One instance: its samples (oldest first), who writes it, and its states.
+
+    ``end_count``: how many of the samples have no data, but tell of an end.
+    """
 
     __slots__ = (
         "disposed_generation_count",
+        "end_count",
         "key",
         "no_writers_generation_count",
         "rank",
@@ -56,6 +60,7 @@ class Instance:
         self.writers: set[bytes] = set()
         self.state = _ALIVE
         self.view_state = _NEW
+        self.end_count = 0
         self.disposed_generation_count = 0
         self.no_writers_generation_count = 0
         self.rank = 0
@@ -131,18 +136,18 @@ class ReaderHistoryCache:
                 return True  # the end of something that nobody here has heard of
             if len(self._instances) >= self._max_instances:
                 return self._no_room("max_instances")
-            instance = self._instances[change.key] = Instance(change.key)
+            instance = Instance(change.key)  # known from the moment that it has a sample
         if change.kind is not ChangeKind.ALIVE:
             self._add_end(instance, change, now)
             return True
         samples = instance.samples
-        if self._depth:
-            if len(samples) >= self._depth:
-                self._push_out(instance)
+        if self._depth and len(samples) - instance.end_count >= self._depth:
+            self._push_out(instance)
         else:
             limit = self._limit_reached(instance, len(change.payload))
             if limit is not None:
                 return self._no_room(limit)
+            self._instances[change.key] = instance
         if instance.state is not _ALIVE:
             self._revive(instance)
         if change.writer_guid not in instance.writers:
@@ -179,10 +184,17 @@ class ReaderHistoryCache:
             self._purge(instance)
 
     def _end(self, instance: Instance, state: InstanceState, change: CacheChange, now: float) -> None:
-        """The instance is not alive any more: a sample without data says so, one at most at the end of its queue."""
+        """The instance is not alive any more: a sample without data says so.
+
+        One is enough at the end of its queue, and with KEEP_LAST one in all: an instance that ends and begins again
+        a thousand times does not fill the cache.
+        """
         instance.state = state
         last = instance.samples[-1] if instance.samples else None
         if last is None or last.valid_data or last.sample_state is _READ:
+            if self._depth and instance.end_count:
+                self._remove(instance, next(info for info in instance.samples if not info.valid_data))
+            instance.end_count += 1
             info = SampleInfo(change, now + self._clock_offset, valid_data=False)
             info.instance_handle = instance.key
             info.disposed_generation_count = instance.disposed_generation_count
@@ -220,12 +232,24 @@ class ReaderHistoryCache:
 
     def _push_out(self, instance: Instance) -> None:
         """KEEP_LAST: the oldest sample with data goes.  What tells of an end stays; there is one such at most."""
-        oldest = instance.samples.popleft()
-        self._discard(oldest)
+        self._remove(instance, next(info for info in instance.samples if info.valid_data))
+
+    def _remove(self, instance: Instance, info: SampleInfo) -> None:
+        """A sample makes room; its place in the order of arrival is tidied up later."""
+        self._leave(instance, info)
+        self._discard(info)
         self._removed_count += 1
         if self._removed_count > _COMPACT_ABOVE and self._removed_count * 2 > len(self._order):
             self._order = deque(info for info in self._order if info._change is not None)
             self._removed_count = 0
+
+    def _leave(self, instance: Instance, info: SampleInfo) -> None:
+        if instance.samples[0] is info:
+            instance.samples.popleft()
+        else:
+            instance.samples.remove(info)
+        if not info.valid_data:
+            instance.end_count -= 1
 
     def _discard(self, info: SampleInfo) -> None:
         change = info._change
@@ -254,7 +278,7 @@ class ReaderHistoryCache:
                 self._removed_count -= 1
                 continue
             instance = self._instances[info.instance_handle]
-            instance.samples.remove(info) if instance.samples[0] is not info else instance.samples.popleft()
+            self._leave(instance, info)
             self._octets -= len(change.payload)
             info.view_state = instance.view_state
             instance.view_state = _NOT_NEW
@@ -279,7 +303,7 @@ class ReaderHistoryCache:
         chosen = self._select(max_samples, sample_states, view_states, instance_states, instance, selector)
         result = [(info, info._change) for info, _ in chosen]
         for info, of in chosen:
-            of.samples.remove(info) if of.samples[0] is not info else of.samples.popleft()
+            self._leave(of, info)
             self._discard(info)
             self._removed_count += 1
             self._purge(of)
