@@ -178,7 +178,7 @@ class UdpTransport:
             sock.bind((bind_address_for_group(group), port))
         except OSError as error:
             raise OutOfResources(
-                f"cannot listen on {group}:{port} ({error}): another program holds the port for itself; stop it, choose "
+                f"cannot listen on {group}:{port} ({error}): another program holds the port for itself; stop it, use "
                 "another domain, or do without multicast: Config(multicast=False, peers=...)"
             ) from error
         enlarge_buffer(sock, socket.SO_RCVBUF, self._config.receive_buffer_size)
