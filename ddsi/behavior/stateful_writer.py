@@ -30,6 +30,7 @@ __all__ = ["StatefulWriter"]
 
 _STALLED_AFTER_S = 0.5
 _PACE_S = 0.001
+_LEAST_REPAIR_OCTETS = 64 * 1024  # what one request for repair brings at least, however small the window is
 
 
 class StatefulWriter:
@@ -123,7 +124,7 @@ class StatefulWriter:
             related=related,
         )
         cache.add(change)
-        if lifespan != math.inf:
+        if lifespan != math.inf and kind is ChangeKind.ALIVE:  # DDS 1.4 §2.2.3.16: data expires, not the end of it
             change.expiry = now + lifespan
             self._expiries.append((change.expiry, change.sequence_number))
         if self._reliable_readers:
@@ -380,7 +381,7 @@ class StatefulWriter:
         if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:
             self._acknowledged(proxy, now)
         out = self._requested_changes(proxy, requested, now) if requested else []
-        if not final or (out and proxy.acked_sn < proxy.lst_seq):
+        if not final or (out and self._lags(proxy)):
             out.append(self.directed_heartbeat(proxy))
         if self._lags(proxy):
             self.heartbeat.written(now)
@@ -390,7 +391,7 @@ class StatefulWriter:
     def _requested_changes(self, proxy: ReaderProxy, requested: NumberSet, now: float) -> list[WriterTransmission]:
         """Send again what is here, and a GAP for what is not.  RTPS 2.5 §8.4.7.5.3, §8.4.9.2.10-12."""
         end_sn = self.next_unsent_sn
-        budget = max(self.window.octets, self.fragment_octets)
+        budget = max(self.window.octets, self.fragment_octets, _LEAST_REPAIR_OCTETS)
         irrelevant: list[int] = []
         out: list[WriterTransmission] = []
         for number in requested:
@@ -428,7 +429,7 @@ class StatefulWriter:
             return list(gap_for(self.cache, proxy, [sequence_number], self.next_unsent_sn))
         unsent = self._next_unsent_fragment if sequence_number == self.next_unsent_sn else None
         end = unsent if unsent is not None else self.fragment_count(change) + 1
-        budget = max(self.window.octets // self.fragment_octets, 1)
+        budget = max(max(self.window.octets, _LEAST_REPAIR_OCTETS) // self.fragment_octets, 1)
         wanted = [number for number in missing if 1 <= number < end][:budget]
         if not wanted:
             return []

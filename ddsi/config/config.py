@@ -74,8 +74,8 @@ class Config:
 
     # --- sizes ---
     max_message_size: int | None = None
-    """The longest UDP payload that we send, 512 to 65507.  None: whole datagrams on loopback, and elsewhere about ten
-    Ethernet frames, so that the loss of one costs little."""
+    """The longest UDP payload that we send, 512 to 65507.  None: what fits a frame of the interface (up to 65,000
+    on loopback), so that the loss of a frame costs no more than it held."""
     fragment_size: int | None = None
     """How much of a large sample goes into one DATA_FRAG.  None: what fills a message."""
     receive_buffer_size: int | None = None

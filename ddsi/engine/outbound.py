@@ -43,6 +43,7 @@ __all__ = ["Outbound", "fragment_octets_for"]
 
 _PADDING = (b"", b"\0\0\0", b"\0\0", b"\0")
 _UNKNOWN_ID = bytes(4)
+_KEY_HASH_OCTETS = 16
 # RTPS header, INFO_DST, INFO_TS, the head of a DATA_FRAG, a HEARTBEAT: what travels with a fragment.
 _FRAGMENT_COMPANY = 20 + 16 + 12 + 36 + 32
 _LARGEST_FRAGMENT = 65_000  # fragmentSize is a uint16, and a datagram ends at 65,507
@@ -117,7 +118,9 @@ class Outbound:
                     self._append(writer, reader, gap.encode(), None)
 
     def _send_data(self, writer: LocalWriter, change: CacheChange, reader: ReaderProxy | None) -> None:
-        payload = self._hooks.encode_payload(writer.guid, change.payload) if change.payload else b""
+        payload: Octets = change.payload if change.kind is ChangeKind.ALIVE else _key_payload(change.payload)
+        if payload:
+            payload = self._hooks.encode_payload(writer.guid, payload)
         data = Data(
             reader.entity_id if reader is not None else EntityId.UNKNOWN,
             writer.guid.entity_id,
@@ -254,6 +257,14 @@ class Outbound:
         parts = packer.take()
         if locators:
             self._emit(SendDatagram(locators, self._hooks.encode_message(receivers, parts)))
+
+
+def _key_payload(payload: Octets) -> Octets:
+    """The payload of a dispose or unregister, made longer than a key hash by zeros where it is not.
+
+    Fast DDS takes a key-only payload of 16 octets or less, header and all, for the key hash itself.
+    """
+    return payload if not 0 < len(payload) <= _KEY_HASH_OCTETS else bytes(payload).ljust(_KEY_HASH_OCTETS + 4, b"\0")
 
 
 def _inline_qos(change: CacheChange) -> ParameterList | None:

@@ -28,7 +28,7 @@ from .platform import (
 __all__ = ["UdpTransport"]
 
 _LOOPBACK_MESSAGE = 65000
-_OTHER_MESSAGE = 14720  # about ten Ethernet frames
+_LEAST_MESSAGE = 548  # what every IPv4 host takes (RFC 791), less the headers
 _IP_UDP_HEADERS = 28
 _JOIN_BELOW = 2048
 _MAX_IOV = 512
@@ -73,13 +73,14 @@ class UdpTransport:
 
     @property
     def max_message_octets(self) -> int:
-        """The largest UDP payload to send: whole datagrams on loopback, elsewhere some frames' worth."""
+        """The largest UDP payload to send: whole datagrams on loopback, elsewhere what fits a frame.
+
+        A datagram of several frames is lost when one of them is; at 10 % loss, of those of ten frames a third arrives.
+        """
         if self._config.max_message_size is not None:
             return self._config.max_message_size
         mtu = min(interface.mtu for interface in self.interfaces)
-        return min(
-            _LOOPBACK_MESSAGE if self.is_loopback_only else _OTHER_MESSAGE, max(mtu - _IP_UDP_HEADERS, _OTHER_MESSAGE)
-        )
+        return min(_LOOPBACK_MESSAGE, max(mtu - _IP_UDP_HEADERS, _LEAST_MESSAGE))
 
     def unicast_locators(self) -> tuple[Locator, ...]:
         """Where this participant can be reached; loopback only when there is nothing else."""

@@ -36,6 +36,7 @@ _CANONICAL = Encoding(XCDR2, little_endian=False)
 _CANONICAL_HEADER = _CANONICAL.encapsulation_id(Extensibility.FINAL) + bytes(2)
 
 _DELIMITED = (b"\x00\x08", b"\x00\x09")  # D_CDR2, big and little endian
+_FILLED_UP_OCTETS = 20
 _VIEW_FROM = 4096
 """A memoryview of fewer octets is copied first: bytes are read faster."""
 
@@ -157,15 +158,26 @@ class TypeSupport(Generic[T]):
         """The key of an appendable type in XCDR2 comes with its DHEADER, but Cyclone DDS 0.10 leaves that out.
 
         So one that does not announce what follows it is no DHEADER, nor is one behind which nothing fits the type.
+        And a short key payload is filled up with zeros to 20 octets (by ourselves, for the sake of Fast DDS).
         """
         if bytes(octets[:2]) not in _DELIMITED or len(octets) < 8:
-            return self._read_key_payload(octets)
+            return self._read_filled_up_key(octets)
         byteorder: Literal["little", "big"] = "little" if octets[1] & 1 else "big"
         beyond = len(octets) - 8 - int.from_bytes(octets[4:8], byteorder)
-        if 0 <= beyond <= 3:  # what is beyond it can be padding
+        if 0 <= beyond <= 3 or (beyond > 0 and _is_filled_up(octets, beyond)):  # what is beyond it can be padding
             with suppress(MalformedSample):
-                return self._read_key_payload(octets)
+                return self._read_key_payload(octets[: len(octets) - max(beyond - 3, 0)])
         return self._read_undelimited_key(bytes((0, octets[1] - 2)) + bytes(octets[2:]))
+
+    def _read_filled_up_key(self, octets: Octets) -> Any:
+        try:
+            return self._read_key_payload(octets)
+        except MalformedSample:
+            for beyond in (4, 8, 12):
+                if _is_filled_up(octets, beyond):
+                    with suppress(MalformedSample):
+                        return self._read_key_payload(octets[:-beyond])
+            raise
 
     def key_hash(self, key: bytes, representation: DataRepresentationId) -> bytes:
         """The 16 octets of the key hash that a writer with this representation gives (RTPS 2.5 §9.6.4.8).
@@ -315,6 +327,11 @@ class TypeSupport(Generic[T]):
             return extractors[identifier](octets)
 
         extractors[identifier] = generate_first
+
+
+def _is_filled_up(octets: Octets, beyond: int) -> bool:
+    """Is this a key payload of which so many octets at the end are nothing but filling?"""
+    return len(octets) == _FILLED_UP_OCTETS and not any(octets[-beyond:])
 
 
 def _no_key(_: Any) -> bytes:
