@@ -2,6 +2,7 @@
 
 Cyclone DDS 0.10.2 writes the key of an appendable type in XCDR2 without its DHEADER: these octets are those of its
 dispose of ShapeType BLUE; release 11.0.1 writes what the specification says.
+"""
 
 from __future__ import annotations
 
