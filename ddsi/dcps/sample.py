@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Generic, TypeVar
 
 from ..structure.sample_info import SampleInfo
@@ -27,7 +26,3 @@ class Sample(Generic[T]):
 
     def __repr__(self) -> str:
         return f"Sample({self.data!r}, {self.info!r})"
-
-    def __iter__(self) -> Iterator[object]:
-        """``data, info = sample``"""
-        return iter((self.data, self.info))

@@ -96,15 +96,6 @@ async def test_two_tasks_share_a_reader_and_no_sample_comes_twice(domain: int) -
     assert sorted(seen) == list(range(100))
 
 
-@in_trio
-async def test_a_sample_unpacks_into_data_and_info(domain: int) -> None:
-    async with pair(domain, local=True) as p:
-        await p.writer.write(Shape("RED", 1, 2))
-        data, info = await anext(p.reader)
-    assert data == Shape("RED", 1, 2)
-    assert isinstance(info, ddsi.SampleInfo)
-
-
 # --- take and read ---------------------------------------------------------------------------------------
 
 
