@@ -78,6 +78,7 @@ class AckNackSchedule:
     __slots__ = (
         "_asked_at",
         "_preemptive",
+        "_preemptive_at",
         "_preemptive_period",
         "_repeat",
         "_response",
@@ -91,6 +92,7 @@ class AckNackSchedule:
         self.asked_sn = 0  # the highest number that was asked for; what lies above is news
         self.is_wanted = False  # a HEARTBEAT wants an answer, whether anything is missing or not
         self._preemptive = True
+        self._preemptive_at = -math.inf
         self._preemptive_period = PREEMPTIVE_MIN
         self._repeat = NACK_REPEAT_FIRST
         self._response = -1.0  # smoothed seconds from asking to the answer; negative: none was measured yet
@@ -110,6 +112,7 @@ class AckNackSchedule:
             self.due = math.inf
 
     def preemptive_sent(self, now: float) -> None:
+        self._preemptive_at = now
         self.due = now + self._preemptive_period
         self._preemptive_period = min(self._preemptive_period * 2, PREEMPTIVE_MAX)
 
@@ -120,6 +123,9 @@ class AckNackSchedule:
 
     def missing(self, now: float, *, is_news: bool) -> None:
         """Something is known to be missing; ``is_news``: some of it was not asked for yet."""
+        if self._preemptive:  # samples come, but the HEARTBEAT that says where they begin was lost
+            self.due = min(self.due, max(now + NACK_DELAY, self._preemptive_at + PREEMPTIVE_MIN))
+            return
         self.due = min(self.due, now + NACK_DELAY if is_news else max(now + NACK_DELAY, self.repeat_due))
 
     @property

@@ -16,7 +16,6 @@ from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
 from .defrag import FRAGMENT_SILENCE, Defragmenter, PartialSample
-from .schedules import NACK_DELAY
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
 
@@ -143,7 +142,8 @@ class StatefulReader:
                 if not proxy.is_reliable:
                     return 0
                 if proxy.schedule.due != math.inf:
-                    self._progressed(proxy, now)
+                    proxy.schedule.progress(now, number)
+                    proxy.note_missing(now)
                 return 0
         if proxy.is_reliable:
             self._receive_reliable(proxy, change, now)
@@ -250,10 +250,11 @@ class StatefulReader:
             out.append(proxy.nack_frag(number, sample.missing()))
         if missing or silent:
             schedule.nack_sent(now, max([*missing, *(number for number, _ in silent)]))
-        elif partial or proxy.next_sn <= proxy.last_seq:
-            soon = now + (FRAGMENT_SILENCE if partial else NACK_DELAY)
-            schedule.wait(soon if partial else max(soon, schedule.repeat_due))
-        else:
+        elif partial:
+            schedule.wait(now + FRAGMENT_SILENCE)
+        elif not may_repeat and proxy.missing_changes():
+            schedule.wait(schedule.repeat_due)
+        else:  # nothing is missing, though the history may have no room for what is here
             schedule.complete()
         return out
 

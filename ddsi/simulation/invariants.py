@@ -73,11 +73,14 @@ def _session_flaws(reader: NodeReader, writer: NodeWriter, changes: list[CacheCh
 
 
 def _is_same(received: CacheChange, original: CacheChange) -> bool:
-    """Kind, key and octets; a submessage is padded to a multiple of 4, so up to three octets may follow the payload."""
+    """Kind, key and octets.  A submessage is padded to a multiple of 4, so zeros may follow the payload; short keys are
+    filled up with more of them."""
     if (received.kind, received.key) != (original.kind, original.key):
         return False
     size = len(original.payload)
-    return bytes(received.payload[:size]) == original.payload and len(received.payload) - size in range(4)
+    if bytes(received.payload[:size]) != original.payload or any(received.payload[size:]):
+        return False
+    return len(received.payload) - size < 4 or received.kind is not ChangeKind.ALIVE
 
 
 def _taking_flaws(reader: NodeReader) -> Iterator[str]:
@@ -289,6 +292,7 @@ def quiet(domain: Domain, seconds: float) -> list[str]:
         else:
             others.append(f"{domain.now:.3f} s: {_names(octets)} from {_node_name(domain, guid)}")
 
+    timeouts = {node.guid: node.timeout_count for node in domain.live_nodes()}
     domain.network.watch = watch
     domain.run(seconds)
     domain.network.watch = None
@@ -298,6 +302,10 @@ def quiet(domain: Domain, seconds: float) -> list[str]:
         most = seconds / node.engine.config.announcement_period * 1.2 + 6 + 16 * len(domain.nodes)
         if announced.get(node.guid, 0) > most:
             wrong.append(f"{node.name} announced itself {announced[node.guid]} times in {seconds} s")
+        # Besides announcing, leases are looked at now and then.
+        woken = node.timeout_count - timeouts.get(node.guid, 0)
+        if woken > 2 * most + len(domain.nodes) * seconds:
+            wrong.append(f"{node.name} woke up {woken} times in {seconds} s, for nothing")
     return wrong
 
 

@@ -72,6 +72,7 @@ class Node:
         self.readers: list[NodeReader] = []
         self.statuses: list[tuple[float, Guid, Status]] = []
         self.discovery_changes = 0
+        self.timeout_count = 0
         self.is_up = False
         self._dice = dice
         self._trace = trace
@@ -257,6 +258,7 @@ class Node:
             return
         self._wake_at = math.inf
         if engine.next_deadline() <= self.now:
+            self.timeout_count += 1
             engine.handle_timeout(self.now)
         self.pump()
 

@@ -268,7 +268,7 @@ def test_numbers_that_are_settled_are_forgotten() -> None:
     assert list(defrag.partial_for(R1)) == [3]
 
 
-# --- when to ask ------------------------------------------------------------------------------------------------------
+# --- when to ask ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
