@@ -50,7 +50,7 @@ async def test_a_nursery_inside_the_body_raises_its_own_group(domain: int) -> No
         raise Mistake("in a task of the user's")
 
     with pytest.raises(ExceptionGroup) as caught:
-        async with ddsi.DomainParticipant(domain), trio.open_nursery() as nursery:
+        async with ddsi.DomainParticipant(domain), trio.open_nursery(strict_exception_groups=True) as nursery:
             nursery.start_soon(fail)
             nursery.start_soon(trio.sleep_forever)
     assert [type(error) for error in caught.value.exceptions] == [Mistake]
