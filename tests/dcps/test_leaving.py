@@ -259,4 +259,4 @@ async def test_leaving_does_not_wait_long_for_a_reader_that_is_full(domain: int)
             for number in range(3):
                 await writer.write(Shape("RED", number))
             before = trio.current_time()
-        assert trio.current_time() - before < 1.5
+        assert trio.current_time() - before < 3
