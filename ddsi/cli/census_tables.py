@@ -52,6 +52,7 @@ def _participants(census: Census) -> Table:
         f"Participants of domain {census.domain_id}: {len(census.participants)}",
         ("#", "VENDOR", "NAME", "HOST", "PROCESS", "RTPS", "LEASE", "WRITERS", "READERS", "ADDRESS", "GUID PREFIX"),
         frozenset({"#", "LEASE", "WRITERS", "READERS"}),
+        ("RTPS", "LEASE", "GUID PREFIX", "ADDRESS", "HOST", "PROCESS", "READERS", "WRITERS"),
     )
     for number, participant in enumerate(census.participants, 1):
         data = participant.data
@@ -104,6 +105,7 @@ def _endpoints(census: Census) -> Table:
         f"Endpoints: {len(numbered)}",
         ("TOPIC", "KIND", "TYPE", "OF", "FITS", "QOS", "ENTITY"),
         frozenset({"FITS"}),
+        ("ENTITY", "TYPE", "QOS"),
     )
     for topic, _, number, endpoint in numbered:
         vendor = census.participants[number - 1].vendor

@@ -6,10 +6,16 @@ running, could prevent that.
 
 from __future__ import annotations
 
+import os
 import signal
+import stat
+import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import suppress
 
 import trio
+
+from .exit_status import ExitStatus
 
 __all__ = ["run"]
 
@@ -29,20 +35,45 @@ def run(command: Callable[[], Awaitable[int]]) -> int:
 
 async def _supervised(command: Callable[[], Awaitable[int]]) -> int:
     status = 0
-    caught = 0
+    ended_by = 0  # the status that a signal, or the loss of our output, asks for
 
-    async def watch(signals: AsyncIterator[int], scope: trio.CancelScope) -> None:
-        nonlocal caught
+    async def watch_signals(signals: AsyncIterator[int]) -> None:
+        nonlocal ended_by
         async for number in signals:
-            caught = number
-            scope.cancel()
+            ended_by = ended_by or _SIGNAL_BASE + number
+            nursery.cancel_scope.cancel()
+
+    async def watch_output() -> None:
+        nonlocal ended_by
+        await _output_lost()
+        ended_by = ended_by or ExitStatus.BROKEN_PIPE
+        nursery.cancel_scope.cancel()
 
     with trio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async with trio.open_nursery() as nursery:
-            nursery.start_soon(watch, signals, nursery.cancel_scope)
+            nursery.start_soon(watch_signals, signals)
+            nursery.start_soon(watch_output)
             status = await command()
             nursery.cancel_scope.cancel()
-    return _SIGNAL_BASE + caught if caught else status
+    if ended_by == ExitStatus.BROKEN_PIPE:
+        raise BrokenPipeError
+    return ended_by or status
+
+
+async def _output_lost() -> None:
+    """Until whoever reads our output is gone (``ddsi ls --watch | head -1``).
+
+    Writing would tell, but a command that waits for news may not write for hours.  epoll reports the end of a pipe that
+    is written to as readable; where there is no epoll, the next write must do.
+    """
+    if trio.lowlevel.current_statistics().io_statistics.backend == "epoll" and sys.stdout is not None:
+        # ValueError: no real file; OSError: one that epoll does not take.
+        with suppress(OSError, ValueError):
+            descriptor = sys.stdout.fileno()
+            if stat.S_ISFIFO(os.fstat(descriptor).st_mode):
+                await trio.lowlevel.wait_readable(descriptor)
+                return
+    await trio.sleep_forever()
 
 
 def _innermost(group: BaseExceptionGroup[BaseException]) -> BaseException:

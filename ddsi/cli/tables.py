@@ -15,6 +15,8 @@ __all__ = ["Table", "shown"]
 
 _MAX_CELL = 400
 _NO_VALUE = "-"
+_GAP = 3
+"""Characters that rich puts between two columns."""
 
 
 def shown(text: str, limit: int = _MAX_CELL) -> str:
@@ -24,11 +26,16 @@ def shown(text: str, limit: int = _MAX_CELL) -> str:
 
 @dataclass(slots=True)
 class Table:
-    """Rows of texts below a title and heads.  Columns named in ``numeric`` stand to the right."""
+    """Rows of texts below a title and heads.
+
+    Columns named in ``numeric`` stand to the right; those in ``dispensable`` are left out one by one, the first first,
+    where a terminal is too narrow for all.
+    """
 
     title: str
     columns: tuple[str, ...]
     numeric: frozenset[str] = frozenset()
+    dispensable: tuple[str, ...] = ()
     rows: list[tuple[str, ...]] = field(default_factory=list)
 
     def add(self, *cells: object) -> None:
@@ -47,9 +54,12 @@ class Table:
 
     def plain_lines(self) -> list[str]:
         """Title, heads and rows in columns two blanks apart; a line is as long as it must be."""
+        widths = self._widths()
+        return [self.title, *("  " + self._plain_row(row, widths) for row in (self.columns, *self.rows))]
+
+    def _widths(self) -> list[int]:
         body = [self.columns, *self.rows]
-        widths = [max(len(row[index]) for row in body) for index in range(len(self.columns))]
-        return [self.title, *("  " + self._plain_row(row, widths) for row in body)]
+        return [max(len(row[index]) for row in body) for index in range(len(self.columns))]
 
     def _plain_row(self, row: tuple[str, ...], widths: list[int]) -> str:
         cells = (
@@ -64,14 +74,31 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        table = RichTable(title=Text(self.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+        hidden = self._hidden(terminal_width())
+        title = f"{self.title} (no room for {', '.join(hidden)})" if hidden else self.title
+        table = RichTable(
+            title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
+        )
         for column in self.columns:
-            table.add_column(column, justify="right" if column in self.numeric else "left", overflow="fold")
+            if column not in hidden:
+                table.add_column(column, justify="right" if column in self.numeric else "left", overflow="fold")
         for row in self.rows:
-            table.add_row(*(Text(cell) for cell in row))
+            cells = zip(self.columns, row, strict=True)
+            table.add_row(*(Text(cell) for column, cell in cells if column not in hidden))
         console = Console(
             file=io.StringIO(), width=terminal_width(), force_terminal=True, no_color=not uses_colour(), highlight=False
         )
         console.print(table)
         assert isinstance(console.file, io.StringIO)
         return [line.rstrip() for line in console.file.getvalue().splitlines()]
+
+    def _hidden(self, width: int) -> list[str]:
+        """Columns to leave out so that the others fit the width, as far as that goes."""
+        needed = dict(zip(self.columns, self._widths(), strict=True))
+        hidden: list[str] = []
+        for column in self.dispensable:
+            if sum(needed.values()) + _GAP * len(needed) <= width:
+                break
+            del needed[column]
+            hidden.append(column)
+        return hidden
