@@ -13,6 +13,7 @@ __all__ = ["known_limit"]
 CYCLONES = frozenset({"cyclone", "cyclone11"})
 FASTDDS = frozenset({"fastdds"})
 DUST = frozenset({"dust"})
+OURS = frozenset({"ddsi"})
 FOREIGN = CYCLONES | FASTDDS | DUST
 
 
@@ -63,7 +64,7 @@ _LIMITS = (
     ),
     _Limit(
         frozenset({"fragments", "fragments-late"}),
-        FOREIGN,
+        FOREIGN | OURS,
         DUST,
         'Dust DDS fails ("index out of bounds") when more than 256 fragments of a sample are missing, and does not '
         "recover from the loss of larger ones",
@@ -71,7 +72,7 @@ _LIMITS = (
     _Limit(
         frozenset({"fragments-late"}),
         DUST,
-        FOREIGN,
+        FOREIGN | OURS,
         "Dust DDS does not send again what went out in fragments",
     ),
     _Limit(frozenset({"burst"}), DUST, DUST, "Dust DDS does not repair all that a full socket buffer loses"),
