@@ -105,7 +105,7 @@ class Entity:
 
         Raises BadParameter where an entity of this kind has no such status.
         """
-        if kind not in self.STATUSES:
+        if not any(kind is known for known in self.STATUSES):
             names = ", ".join(known.__name__ for known in self.STATUSES) or "none"
             raise BadParameter(f"a {type(self).__name__} has the statuses {names}, but no {kind!r}")
         value = self._statuses.get(kind)
