@@ -117,6 +117,9 @@ class FilteringWriter(StatefulWriter):
     def _lags(self, proxy: ReaderProxy) -> bool:
         return proxy.is_reliable and proxy.acked_sn < proxy.lst_seq
 
+    def _gap_end(self, proxy: ReaderProxy) -> int:
+        return proxy.lst_seq + 1
+
     def _proxy_added(self, proxy: ReaderProxy) -> None:
         """A late joiner that is to have history: the highest number of it that is for this reader counts as sent."""
         wanted = [number for number in self._numbers_of(proxy) if proxy.history_sn < number < self.next_unsent_sn]

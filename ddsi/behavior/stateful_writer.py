@@ -406,8 +406,12 @@ class StatefulWriter:
                 sent, octets = self._resend(change, proxy, budget)
                 out.extend(sent)
                 budget -= octets
-        gaps: list[WriterTransmission] = list(gap_for(self.cache, proxy, irrelevant, end_sn))
+        gaps: list[WriterTransmission] = list(gap_for(self.cache, proxy, irrelevant, self._gap_end(proxy)))
         return gaps + out
+
+    def _gap_end(self, proxy: ReaderProxy) -> int:
+        """How far (exclusive) a GAP to this reader may reach: never beyond what a HEARTBEAT to it would announce."""
+        return self.next_unsent_sn
 
     def _resend(self, change: CacheChange, proxy: ReaderProxy, budget: int) -> tuple[list[WriterTransmission], int]:
         """One change to one reader, or the beginning of it that fits the budget: a NACK_FRAG asks for the rest."""
@@ -426,7 +430,7 @@ class StatefulWriter:
         proxy.progress_time = now
         change = self.cache.get(sequence_number)
         if change is None or is_irrelevant(self.cache, proxy, sequence_number):
-            return list(gap_for(self.cache, proxy, [sequence_number], self.next_unsent_sn))
+            return list(gap_for(self.cache, proxy, [sequence_number], self._gap_end(proxy)))
         unsent = self._next_unsent_fragment if sequence_number == self.next_unsent_sn else None
         end = unsent if unsent is not None else self.fragment_count(change) + 1
         budget = max(max(self.window.octets, _LEAST_REPAIR_OCTETS) // self.fragment_octets, 1)

@@ -38,6 +38,7 @@ class WriterProxy:
         "_heartbeat_count",
         "_heartbeat_time",
         "_nack_frag_count",
+        "contradictions",
         "data",
         "guid",
         "historical_sn",
@@ -77,6 +78,7 @@ class WriterProxy:
         self.schedule = AckNackSchedule()
         self.last_seq = 0
         self.historical_sn = -1  # what the first HEARTBEAT said is there; -1: none came yet
+        self.contradictions = 0  # HEARTBEATs, one after the other, that do not know what was already delivered
         self.is_alive = True
         self.liveliness_due = math.inf
         self._acknack_count = 0
@@ -140,6 +142,10 @@ class WriterProxy:
         was_first = self.schedule.is_preemptive
         self.schedule.heartbeat_received()
         knew_any = self.last_seq > 0 or self.reorder.next_sn > 1
+        # A writer that no longer has a number which it has already sent was written anew (RTPS 2.5 §8.2.3: they
+        # ascend).
+        is_known = last >= self.reorder.next_sn - 1 or self.uses_filter
+        self.contradictions = 0 if is_known else self.contradictions + 1
         lost = self.reorder.skip_to(first)
         self.last_seq = max(self.last_seq, last)
         if self.historical_sn < 0:

@@ -1,7 +1,7 @@
-"""EndpointRegistry: every endpoint that remote participants announced, found by topic.
+"""EndpointRegistry: every endpoint that remote participants announced, found by topic and by participant.
 
-RTPS 2.5 §8.5.4 (SEDP).  Strangers fill this table, so it is bounded: in all, and per participant; what does not
-fit is not stored and counted by the caller.
+RTPS 2.5 §8.5.4 (SEDP).  Strangers fill this table.  Its bound, and who gives way when it is reached, is its user's
+affair (``engine.eviction``), as writers and readers share one bound.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 from ..structure.discovered import DiscoveredEndpointData
-from ..structure.guid import Guid
+from ..structure.guid import Guid, GuidPrefix
 
 __all__ = ["EndpointRegistry"]
 
@@ -18,13 +18,14 @@ Endpoint = TypeVar("Endpoint", bound=DiscoveredEndpointData)
 
 
 class EndpointRegistry(Generic[Endpoint]):
-    """Announced endpoints of one kind (writers or readers), by Guid and by topic name."""
+    """Announced endpoints of one kind (writers or readers).  All that it returns is in the order of announcement."""
 
-    __slots__ = ("_by_guid", "_by_topic")
+    __slots__ = ("_by_guid", "_by_prefix", "_by_topic")
 
     def __init__(self) -> None:
         self._by_guid: dict[Guid, Endpoint] = {}
         self._by_topic: dict[str, dict[Guid, Endpoint]] = {}
+        self._by_prefix: dict[GuidPrefix, dict[Guid, Endpoint]] = {}
 
     def __len__(self) -> int:
         return len(self._by_guid)
@@ -37,22 +38,30 @@ class EndpointRegistry(Generic[Endpoint]):
         before = self.remove(data.guid)
         self._by_guid[data.guid] = data
         self._by_topic.setdefault(data.topic_name, {})[data.guid] = data
+        self._by_prefix.setdefault(data.guid.prefix, {})[data.guid] = data
         return before
 
     def remove(self, guid: Guid) -> Endpoint | None:
         data = self._by_guid.pop(guid, None)
         if data is not None:
-            of_topic = self._by_topic[data.topic_name]
-            del of_topic[guid]
-            if not of_topic:
-                del self._by_topic[data.topic_name]
+            _take_out(self._by_topic, data.topic_name, guid)
+            _take_out(self._by_prefix, guid.prefix, guid)
         return data
 
     def of_topic(self, topic_name: str) -> list[Endpoint]:
         return list(self._by_topic.get(topic_name, {}).values())
 
-    def of_participant(self, prefix: bytes) -> list[Endpoint]:
-        return [data for guid, data in self._by_guid.items() if guid.startswith(prefix)]
+    def of_participant(self, prefix: GuidPrefix) -> list[Endpoint]:
+        return list(self._by_prefix.get(prefix, {}).values())
 
     def all(self) -> Iterable[Endpoint]:
         return self._by_guid.values()
+
+
+_Key = TypeVar("_Key", str, GuidPrefix)
+
+
+def _take_out(index: dict[_Key, dict[Guid, Endpoint]], key: _Key, guid: Guid) -> None:
+    del index[key][guid]
+    if not index[key]:
+        del index[key]

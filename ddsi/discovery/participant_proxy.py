@@ -62,7 +62,12 @@ class ParticipantProxy:
         if source.address in self._hosts:
             return False
         if len(self._hosts) >= _MAX_HOSTS:
-            del self._hosts[next(iter(self._hosts))]
+            # Anybody can put this participant's prefix into a datagram: that must not make us forget where it lives.
+            announced = {locator.address for locator in (*self.data.metatraffic_unicast, *self.data.default_unicast)}
+            unannounced = next((host for host in self._hosts if host not in announced), None)
+            if unannounced is None:
+                return False
+            del self._hosts[unannounced]
         self._hosts[source.address] = None
         return True
 

@@ -106,6 +106,7 @@ class Alarms:
     def _fire(self, key: Hashable, now: float) -> None:
         engine = self._engine
         timer, *subjects = key if isinstance(key, tuple) else (key,)
+        assert isinstance(timer, Timer)
         engine.recorder.timer(timer.name.lower())
         match timer:
             case Timer.SPDP:

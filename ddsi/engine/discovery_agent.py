@@ -40,6 +40,7 @@ from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
 from ..trace.reasons import DropReason, LossReason
+from .eviction import Eviction
 from .inbound import Incoming
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class DiscoveryAgent:
         )
         self._spdp_writer = StatelessWriter(Guid.of(engine.guid.prefix, ids.SPDP_WRITER))
         self._announcer = SpdpAnnouncer(announce_to, engine.config.announcement_period, engine.random.random)
+        self._eviction = Eviction(engine)
         self._ignored: set[Guid] = set()
         self._disposed_announcements: list[tuple[EntityId, int]] = []
 
@@ -156,7 +158,9 @@ class DiscoveryAgent:
 
     def _participant_announced(self, incoming: Incoming, data: DiscoveredParticipantData) -> None:
         engine = self._engine
-        if data.domain_id is not None and data.domain_id != engine.domain_id:
+        if data.guid.prefix == engine.guid.prefix:  # by way of an INFO_SRC
+            engine.dropped(DropReason.OWN_MESSAGE, incoming.source)
+        elif data.domain_id is not None and data.domain_id != engine.domain_id:
             engine.dropped(DropReason.WRONG_DOMAIN, incoming.source, f"domain {data.domain_id}")
         elif data.domain_tag != self.data.domain_tag:
             engine.dropped(DropReason.DOMAIN_TAG, incoming.source, repr(data.domain_tag))
@@ -164,7 +168,7 @@ class DiscoveryAgent:
             engine.dropped(DropReason.IGNORED, incoming.source)
         elif data.guid.prefix in engine.participants:
             self._participant_announced_again(engine.participants[data.guid.prefix], data, incoming.now)
-        elif len(engine.participants) >= engine.config.max_participants and not self._evict(incoming.now):
+        elif self._eviction.participants_are_full and not self._evict_participant(incoming.now):
             engine.dropped(DropReason.TABLE_FULL_PARTICIPANTS, incoming.source)
         else:
             self._new_participant(incoming, data)
@@ -283,19 +287,30 @@ class DiscoveryAgent:
         self._ignored.add(guid)
         self.participant_lost(guid, LossReason.IGNORED, now)
 
-    def _evict(self, now: float) -> bool:
-        """Make room for a newcomer: a participant that has announced no endpoint goes, the longest silent first.
+    def participant_restarted(self, incoming: Incoming) -> None:
+        """Its writers have begun anew: another incarnation under the same GUID.  What we knew of the former is void.
 
-        A flood of invented participants displaces only its own kind.
+        Stacks that make their prefix from host and process number come back so (in a container, each time).  Without
+        this their discovery data, numbered from 1 again, would be taken for duplicates as long as they live.
         """
-        idle = [proxy for proxy in self._engine.participants.values() if proxy.endpoint_count == 0]
-        if not idle:
-            return False
-        victim = min(idle, key=lambda proxy: proxy.last_heard)
-        if now - victim.last_heard < 1.0:
-            return False
-        self.participant_lost(victim.guid, LossReason.EVICTED, now)
-        return True
+        proxy = self._engine.participants.get(incoming.prefix)
+        if proxy is not None:
+            self.participant_lost(proxy.guid, LossReason.RESTARTED, incoming.now)
+            self._new_participant(incoming, proxy.data)
+
+    def _evict_participant(self, now: float) -> bool:
+        victim = self._eviction.idle_participant(now)
+        if victim is not None:
+            self.participant_lost(victim.guid, LossReason.EVICTED, now)
+        return victim is not None
+
+    def _evict_endpoint(self, newcomer: ParticipantProxy, now: float) -> bool:
+        victim = self._eviction.surplus_endpoint(newcomer)
+        if isinstance(victim, DiscoveredWriterData):
+            self._writer_lost(victim.guid, LossReason.EVICTED, now)
+        elif victim is not None:
+            self._reader_lost(victim.guid, LossReason.EVICTED, now)
+        return victim is not None
 
     # --- our endpoints -----------------------------------------------------------------------------------
 
@@ -346,7 +361,7 @@ class DiscoveryAgent:
         except MalformedMessage as error:
             self._engine.dropped_discovery(change, str(error))
             return
-        if self._may_enter(change, data.guid, self._engine.known_writers.get(data.guid) is not None):
+        if self._may_enter(change, data.guid, now, is_known=self._engine.known_writers.get(data.guid) is not None):
             before = self._engine.known_writers.put(data)
             self._note_endpoint(data, before, now)
             if before is not None and before.topic_name != data.topic_name:
@@ -365,7 +380,7 @@ class DiscoveryAgent:
         except MalformedMessage as error:
             self._engine.dropped_discovery(change, str(error))
             return
-        if self._may_enter(change, data.guid, self._engine.known_readers.get(data.guid) is not None):
+        if self._may_enter(change, data.guid, now, is_known=self._engine.known_readers.get(data.guid) is not None):
             before = self._engine.known_readers.put(data)
             self._note_endpoint(data, before, now)
             if before is not None and before.topic_name != data.topic_name:
@@ -376,17 +391,21 @@ class DiscoveryAgent:
         proxy = self._engine.participants.get(change.writer_guid.prefix)
         return proxy.vendor_id if proxy is not None else b"\0\0"
 
-    def _may_enter(self, change: CacheChange, guid: Guid, is_known: bool) -> bool:
+    def _may_enter(self, change: CacheChange, guid: Guid, now: float, *, is_known: bool) -> bool:
         """A participant announces its own endpoints only, and all of them together have a bound."""
         engine = self._engine
-        if guid.prefix != change.writer_guid.prefix or guid in self._ignored:
+        if guid.prefix != change.writer_guid.prefix:
+            engine.dropped_discovery(change, f"announces {guid}, which is not its own")
+            return False
+        if guid in self._ignored:
+            engine.dropped(DropReason.IGNORED, None, str(guid))
             return False
         proxy = engine.participants.get(guid.prefix)
         if proxy is None:
             return False
         if is_known:
             return True
-        if len(engine.known_writers) + len(engine.known_readers) >= engine.config.max_endpoints:
+        if self._eviction.endpoints_are_full and not self._evict_endpoint(proxy, now):
             engine.dropped(DropReason.TABLE_FULL_ENDPOINTS, None, str(guid))
             return False
         proxy.endpoint_count += 1

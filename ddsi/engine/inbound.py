@@ -44,6 +44,7 @@ _INFO_TS = int(SubmessageKind.INFO_TS)
 _TIMESTAMP = struct.Struct("<II")
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
 _UNKNOWN_ID = bytes(4)
+_CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
 _UNKNOWN_PREFIX = bytes(12)
 
 
@@ -452,6 +453,7 @@ class Inbound:
 
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
+        restarted = False
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
             due = proxy.schedule.due
             lost = local.behavior.receive_heartbeat(
@@ -461,7 +463,10 @@ class Inbound:
                 self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
             if proxy.schedule.due != due:
                 self._engine.proxy_touched(local.behavior, proxy)
+            restarted = restarted or proxy.contradictions >= _CONTRADICTIONS_OF_A_RESTART
         self._forget_settled(incoming, heartbeat.writer_id)
+        if restarted:
+            self._engine.discovery.participant_restarted(incoming)
         if heartbeat.liveliness and incoming.is_for_us:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
 

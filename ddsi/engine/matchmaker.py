@@ -12,7 +12,7 @@ from ..behavior.stateful_reader import RemoteWriter
 from ..discovery.matching import MatchRefusal, RefusalKind, judge
 from ..discovery.participant_proxy import ParticipantProxy
 from ..spi import PENDING, Admission, Refused
-from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
@@ -87,6 +87,12 @@ class Matchmaker:
             if data.guid in reader.behavior.writers:
                 self.unmatch_writer(reader, data.guid, reason, now)
             self._drop(reader.guid, data.guid)
+
+    def is_matched(self, data: DiscoveredEndpointData) -> bool:
+        """Does a local endpoint have a match with this remote one?"""
+        if isinstance(data, DiscoveredWriterData):
+            return data.guid in self._engine.remote_writers
+        return any(data.guid in writer.behavior.readers for writer in self._engine.user_writers(data.topic_name))
 
     def decided(self, local: Guid, remote: Guid, admission: Admission, now: float) -> None:
         """Security made up its mind about a pair that was pending."""

@@ -158,9 +158,9 @@ class Outbound:
             self._append(writer, reader, heartbeat.encode(), None)
 
     def _append(
-        self, writer: LocalWriter, reader: ReaderProxy | None, submessage: Octets | Parts, ticks: int | None
+        self, writer: LocalWriter, reader: ReaderProxy | None, submessage: bytes | Parts, ticks: int | None
     ) -> None:
-        parts: Parts = (submessage,) if isinstance(submessage, (bytes, bytearray, memoryview)) else submessage
+        parts: Parts = (submessage,) if isinstance(submessage, bytes) else submessage
         if reader is None:
             if writer.behavior.locators:
                 parts = self._hooks.encode_submessage(writer.guid, writer.receivers, parts)

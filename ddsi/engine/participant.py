@@ -31,7 +31,7 @@ from ..discovery.builtin_endpoints import BUILTIN_QOS, BUILTIN_TOPICS
 from ..discovery.endpoint_registry import EndpointRegistry
 from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.header import Header
-from ..spi import PLAINTEXT, Decided, LocalParticipant, Octets, SecurityHooks, SendMessage
+from ..spi import PLAINTEXT, Decided, LocalParticipant, Octets, Refused, SecurityHooks, SendMessage
 from ..spi import Compute as HookCompute
 from ..structure import builtin_entity_ids as ids
 from ..structure.cache_change import CacheChange, ChangeKind
@@ -616,7 +616,7 @@ class Participant:
         proxy = self.participants.get(effect.remote[:12])
         if proxy is None:
             return
-        if hasattr(effect.admission, "reason"):
+        if isinstance(effect.admission, Refused):
             self.status(self.guid, SecurityRefused(remote=effect.remote, reason=effect.admission.reason))
             self.discovery.participant_lost(effect.remote, LossReason.REJECTED_BY_SECURITY, now)
         else:

@@ -97,8 +97,8 @@ class Node:
 
     # --- a participant's life ----------------------------------------------------------------------------
 
-    def start(self) -> None:
-        """Come up, under a GUID that nobody had before."""
+    def start(self, prefix: GuidPrefix | None = None) -> None:
+        """Come up, under a GUID that nobody had before, or under a given one."""
         assert not self.is_up
         setup = self.setup
         ports, domain_id, index = setup.config.ports, setup.domain_id, setup.participant_index
@@ -106,7 +106,7 @@ class Node:
         user = Locator.udp_v4(setup.address, ports.user_unicast(domain_id, index))
         group = Locator.udp_v4(setup.config.multicast_address, ports.metatraffic_multicast(domain_id))
         groups = (group,) if setup.multicast else ()
-        prefix = GuidPrefix(OUR_VENDOR_ID + self._dice.octets(10))
+        prefix = prefix or GuidPrefix(OUR_VENDOR_ID + self._dice.octets(10))
         self.engine = engine = Participant(
             ParticipantSetup(
                 domain_id=domain_id,
