@@ -6,6 +6,7 @@ representation.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..discovery.matching import MatchRefusal, RefusalKind, incompatibilities
@@ -61,9 +62,7 @@ def _type_remedy(writer: DiscoveredWriterData, reader: DiscoveredReaderData) -> 
         keyed, keyless = ("writer", "reader") if writer.is_keyed else ("reader", "writer")
         return f"the {keyed}'s type has key members, the {keyless}'s has none: declare the same @key on both sides"
     if _last_part(writer.type_name) == _last_part(reader.type_name):
-        return (
-            "the type is in another module, or the vendor names it otherwise: give it the same full name on both sides"
-        )
+        return "the type is in another module, or a vendor names it otherwise: give it one full name on both sides"
     return "the sides use one topic name for different types: rename one topic, or give both the same type name"
 
 
@@ -98,10 +97,10 @@ def _qos_remedy(policy: str, writer: DiscoveredWriterData, reader: DiscoveredRea
         case "presentation":
             return "set the publisher's access scope, coherent and ordered access at least to what the subscriber wants"
         case "deadline":
-            promised, wanted_s = offered.deadline.period, requested.deadline.period
+            promised = seconds_text(offered.deadline.period)
+            patience = "do without one" if math.isinf(offered.deadline.period) else f"wait {promised} or more"
             return (
-                f"let the writer promise Deadline({wanted_s:g}) or shorter, or let the reader wait "
-                f"{seconds_text(promised)} or more"
+                f"let the writer promise Deadline({requested.deadline.period:g}) or shorter, or the reader {patience}"
             )
         case "latency_budget":
             return (
