@@ -1,0 +1,142 @@
+"""``ddsi doctor``: what it finds on this host's loopback, and what it says where something is wrong."""
+
+from __future__ import annotations
+
+import json
+import socket
+
+import pytest
+
+from ddsi.cli import doctor, main
+from ddsi.cli.doctor import Finding, Verdict, examine
+from ddsi.config import Config
+from ddsi.config.environment import load_config
+from ddsi.transport.platform import Interface
+from ddsi.transport.self_test import multicast_returns, unicast_returns
+
+URI = (
+    "<DDSI><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces>{}"
+    "</General></Domain></DDSI>"
+)
+LOOPBACK = Interface("lo", "127.0.0.1", "255.0.0.0", 65536, is_loopback=True)
+NOWHERE = Interface("gone0", "198.51.100.77", "255.255.255.0", 1500, is_loopback=False)
+
+
+def _findings(domain: int = 173) -> dict[str, Finding]:
+    """By subject; of several the last."""
+    return {finding.subject: finding for finding in examine(domain)}
+
+
+@pytest.fixture(autouse=True)
+def _loopback(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DDSI_URI", URI.format(""))
+
+
+def test_a_sound_host() -> None:
+    found = _findings()
+    assert list(found) == [
+        "versions", "configuration", "interface", "sockets", "reach", "unicast", "multicast", "buffers",
+    ]  # fmt: skip
+    assert found["versions"].text.startswith("Python 3.")
+    assert "interfaces=('127.0.0.1',)" in found["configuration"].text
+    assert "participant index 0" in found["sockets"].text
+    assert found["unicast"] == Finding("unicast", Verdict.OK, "a datagram to 127.0.0.1 arrives")
+    assert not any(finding.verdict is Verdict.FAULT for finding in found.values())
+
+
+def test_a_configuration_that_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the last finding: nothing else can be said."""
+    monkeypatch.setenv("DDSI_URI", "<DDSI><Domain><Generel/></Domain></DDSI>")
+    *_, last = examine(0)
+    assert last.verdict is Verdict.FAULT
+    assert "did you mean <General>" in last.text
+
+
+def test_an_interface_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DDSI_URI", URI.format("").replace("127.0.0.1", "198.51.100.77"))
+    *_, last = examine(0)
+    assert (last.subject, last.verdict) == ("sockets", Verdict.FAULT)
+    assert "there is no interface '198.51.100.77'" in last.text
+
+
+def test_settings_that_mean_nothing_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DDSI_URI", URI.format("<RedundantNetworking>true</RedundantNetworking>"))
+    warnings = [finding for finding in examine(173) if finding.verdict is Verdict.WARNING]
+    assert any("RedundantNetworking" in finding.text for finding in warnings)
+
+
+def test_cyclones_variable_is_not_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", "file:///etc/cyclone.xml")
+    assert "CYCLONEDDS_URI is set" not in str(list(doctor._configuration(load_config(0))))
+    monkeypatch.delenv("DDSI_URI")
+    findings = list(doctor._configuration(Config()))
+    assert [finding.verdict for finding in findings] == [Verdict.OK, Verdict.WARNING]
+    assert "DDSI_URI=$CYCLONEDDS_URI" in findings[1].advice
+
+
+def test_all_well_known_ports_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Domain 99 has its first port, 7400 + 250 * 99 + 10, taken by somebody, and only that one is tried."""
+    limit = "</General><Discovery><MaxAutoParticipantIndex>0</MaxAutoParticipantIndex></Discovery><General>"
+    monkeypatch.setenv("DDSI_URI", URI.format(limit))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 32_160))
+        finding = _findings(99)["sockets"]
+    assert finding.verdict is Verdict.WARNING
+    assert "all well-known ports" in finding.text
+    assert "MaxAutoParticipantIndex" in finding.advice
+
+
+def test_what_is_sent_must_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "unicast_returns", lambda interface: False)
+    monkeypatch.setattr(doctor, "multicast_returns", lambda interface, group: False)
+    found = _findings()
+    assert found["unicast"].verdict is Verdict.FAULT
+    assert "packet filter" in found["unicast"].advice
+    assert found["multicast"].verdict is Verdict.WARNING, "on loopback others are found by unicast"
+
+
+def test_multicast_that_does_not_work_is_a_fault_where_nobody_else_would_be_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Transport:
+        uses_multicast = True
+
+    monkeypatch.setattr(doctor, "unicast_returns", lambda interface: True)
+    monkeypatch.setattr(doctor, "multicast_returns", lambda interface, group: False)
+
+    def verdicts(config: Config) -> list[Verdict]:
+        findings = doctor._datagrams(NOWHERE, config, Transport())  # type: ignore[arg-type]
+        return [finding.verdict for finding in findings]
+
+    assert verdicts(Config()) == [Verdict.OK, Verdict.FAULT]
+    assert verdicts(Config(peers=("198.51.100.1",))) == [Verdict.OK, Verdict.WARNING]
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(None, "ok"), (212_992, "warning"), (4 << 20, "ok")])
+def test_the_kernels_limit(limit: int | None, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "kernel_receive_limit", lambda: limit)
+    finding = _findings()["buffers"]
+    assert finding.verdict == verdict
+    assert ("sysctl -w net.core.rmem_max=4194304" in finding.advice) == (verdict == "warning")
+
+
+def test_self_tests_are_not_fooled() -> None:
+    """They say no, and do not raise, where the interface does not exist."""
+    assert unicast_returns(LOOPBACK)
+    assert not unicast_returns(NOWHERE)
+    assert not multicast_returns(NOWHERE, "239.255.0.1")
+
+
+def test_json_and_status(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert main(["doctor", "-d", "173", "--json"]) == 0
+    form = json.loads(capsys.readouterr().out)
+    assert (form["domain_id"], form["faults"]) == (173, 0)
+    assert form["findings"][1] == {
+        "subject": "configuration",
+        "verdict": "ok",
+        "text": "DDSI_URI is understood: Config(interfaces=('127.0.0.1',))",
+        "advice": "",
+    }
+    monkeypatch.setenv("DDSI_URI", "<nonsense")
+    assert main(["doctor"]) == 1
+    assert capsys.readouterr().out.endswith("1 fault, 0 warnings.\n")
