@@ -22,7 +22,7 @@ help:  ## Say what can be made
 demo: $(VENV)/.ready-to-run  ## Live data between processes, under a minute
 	$(BIN)/ddsi demo
 
-test: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## All tests; those with other stacks where these are installed
+test: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers $(VENV)/.ready-to-lint  ## All tests; those with other stacks where these are installed
 	$(BIN)/python -m pytest $(wildcard tests multiproc_tests) $(ARGS)
 
 quick: $(VENV)/.ready-to-test  ## The tests that take milliseconds, without other processes

@@ -188,8 +188,20 @@ def _arrow_objection(room: str, target: str) -> str:
 # --- the tests -------------------------------------------------------------------------------------------------
 
 
+# Run as a process of its own that imports nothing of ours: another implementation's program, for the demo.
+OTHER_PROGRAMS = {ROOT / "ddsi" / "cli" / "cyclone_peer.py"}
+
+
 def _modules() -> list[Path]:
-    return sorted([*(ROOT / "ddsi").rglob("*.py"), *(ROOT / SECURITY).rglob("*.py")])
+    return sorted({*(ROOT / "ddsi").rglob("*.py"), *(ROOT / SECURITY).rglob("*.py")} - OTHER_PROGRAMS)
+
+
+def test_other_programs_import_nothing_of_ours() -> None:
+    for program in OTHER_PROGRAMS:
+        text = program.read_text(encoding="utf-8")
+        assert "import ddsi" not in text
+        assert "from ddsi" not in text
+        assert "from ." not in text
 
 
 def test_no_arrow_runs_the_wrong_way() -> None:
