@@ -21,6 +21,7 @@ class TraceText:
         self._categories = frozenset(categories)
         self._describer = Describer()
         self._origin: float | None = None
+        self._introduced = 0
 
     def lines(self, event: TraceEvent) -> list[str]:
         """What is to be said of this event: nothing if its category is not wanted."""
@@ -31,7 +32,15 @@ class TraceText:
         said = self._said(event)
         if event.CATEGORY not in self._categories:
             return []
-        return [f"{event.now - self._origin:12.6f}  {names.letter(event.participant)} {text}" for text in said]
+        time = f"{event.now - self._origin:12.6f}"
+        return [*self._introductions(), *(f"{time}  {names.letter(event.participant)} {text}" for text in said)]
+
+    def _introductions(self) -> list[str]:
+        """Who the letters are, for those who have turned up since these were last asked for."""
+        known = list(self._describer.names.participants.items())
+        new = known[self._introduced :]
+        self._introduced = len(known)
+        return [f"{name.letter} = {prefix}  {name}".rstrip() for prefix, name in new]
 
     def _said(self, event: TraceEvent) -> list[str]:
         match event:

@@ -145,7 +145,9 @@ def test_lines_of_text() -> None:
     info_dst = b"\x0e\x01\x0c\x00" + B
     heartbeat = b"\x07\x01\x1c\x00" + bytes(4) + b"\x00\x00\x01\x02" + b"\0\0\0\0\x01\0\0\0" * 2 + b"\x01\0\0\0"
     assert text.lines(e.MessageSent(5.0, A, (HERE,), header + info_dst + heartbeat)) == [
-        "    0.000000  A sent to udpv4/127.0.0.1:7410: to B HEARTBEAT writer 1 1..1 count 1"
+        "A = 01dd0000:00000000:0000000a  ddsi",
+        "B = 01dd0000:00000000:0000000b",
+        "    0.000000  A sent to udpv4/127.0.0.1:7410: to B HEARTBEAT writer 1 1..1 count 1",
     ]
     assert text.lines(e.MessageReceived(5.5, B, HERE, header + heartbeat)) == [
         "    0.500000  B received from udpv4/127.0.0.1:7410: A HEARTBEAT writer 1 1..1 count 1"
