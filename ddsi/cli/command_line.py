@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module, metadata
-from typing import NoReturn, Protocol
+from typing import NoReturn, Protocol, cast
 
 from ..structure.errors import DdsError
 from .exit_status import CommandError, ExitStatus
@@ -39,6 +39,7 @@ class Command(Protocol):
 
     def run(self, arguments: argparse.Namespace) -> int:
         """Do it; returns the exit status.  CommandError and DdsError become one sentence and status 2."""
+        ...
 
 
 class _Parser(argparse.ArgumentParser):
@@ -85,7 +86,7 @@ def _parse(words: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
     command: Command | None = None
     if chosen in _COMMANDS:
-        command = import_module(f"{__package__}.{chosen}")
+        command = cast(Command, import_module(f"{__package__}.{chosen}"))
         _add(subparsers, chosen, command)
     for name, summary in _COMMANDS.items():
         if name != chosen:
