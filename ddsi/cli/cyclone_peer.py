@@ -6,7 +6,8 @@ circles, and prints one line for each.  The interface comes from CYCLONEDDS_URI.
 
 # The binding's annotations mean something at run time only.
 # mypy: ignore-errors
-# pyright: basic, reportInvalidTypeForm=false, reportInvalidTypeArguments=false
+# pyright: basic, reportInvalidTypeForm=false, reportInvalidTypeArguments=false, reportArgumentType=false
+# pyright: reportAttributeAccessIssue=false
 
 import sys
 import time

@@ -6,7 +6,7 @@ Reliability and durability are always said, as they are what people look for fir
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 
@@ -119,6 +119,6 @@ def policy_json(value: object) -> object:
     if is_dataclass(value):
         form = {item.name: policy_json(getattr(value, item.name)) for item in fields(value)}
         return {"kind": type(value).__name__, **form} if hasattr(value, "KIND") else form
-    if hasattr(value, "items"):
+    if isinstance(value, Mapping):
         return {str(name): policy_json(getattr(item, "value", item)) for name, item in value.items()}
     return value

@@ -41,7 +41,9 @@ def test_json_lines_as_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     path = _recording(tmp_path / "a.jsonl")
     assert main(["trace", str(path), "--text", "--only", "timer,remark"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split(maxsplit=2)[2] for line in lines] == ["timer heartbeat (1 ms late)", "B restarts"]
+    told = [line.split(maxsplit=2)[2] for line in lines if line[0] == " "]
+    assert told == ["timer heartbeat (1 ms late)", "B restarts"]
+    assert 'A = 01dd0000:00000000:0000000a  ddsi "nominé"' in lines
 
 
 @pytest.mark.parametrize("name", ["cyclone-best-effort", "fastdds-fragments", "dust-reliable"])
@@ -56,7 +58,11 @@ def test_captures_of_other_vendors(name: str, text: list[str], capsys: pytest.Ca
 def test_a_limit_reads_no_further(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = _recording(tmp_path / "a.jsonl")
     assert main(["trace", str(path), "--text", "--limit", "2"]) == 0
-    assert len(capsys.readouterr().out.splitlines()) == 2
+    assert [line[:12].strip() for line in capsys.readouterr().out.splitlines()] == [
+        "A = 01dd0000",
+        "0.000000",
+        "0.000000",
+    ]
 
 
 def test_standard_input(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
