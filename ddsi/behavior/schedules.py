@@ -8,6 +8,7 @@ below were chosen between what Cyclone DDS (100 ms, doubling) and Fast DDS (3 s,
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 __all__ = ["AckNackSchedule", "HeartbeatSchedule"]
 
@@ -17,11 +18,12 @@ HEARTBEATS_BEFORE_BACKOFF = 3
 NACK_RESPONSE_SUPPRESSION = 0.005  # the same change is not sent again to the same reader within this
 
 NACK_DELAY = 0.001  # a little reordering is no loss
-NACK_REPEAT_FIRST = 0.05  # before it is known how long an answer takes
+NACK_REPEAT_FIRST = 0.05  # before it is known how long an answer takes, at least
 NACK_REPEAT_MIN = 0.01
 NACK_REPEAT_MAX = 2.0
 PREEMPTIVE_MIN = 0.02
 PREEMPTIVE_MAX = 5.0
+_MAX_TIMED = 512  # how many numbers under way are timed
 
 
 class HeartbeatSchedule:
@@ -72,11 +74,15 @@ class AckNackSchedule:
     there is nothing to tell.  A wanted acknowledgment goes out at once.  Missing numbers are asked for after
     1 ms.  What was asked for is asked for again only when the answer is overdue: on a long link the repairs are still
     under way while newer losses are noticed, and asking for all of them each time would have each sent many times over.
-    How long an answer takes is learnt from the answers; each vain repetition doubles the time, to 2 s.
+    How long an answer takes is learnt from the answers; each vain repetition doubles the time, to 2 s.  But a HEARTBEAT
+    shows that the writer is there, so what is overdue is asked for again with the answer to it.
     """
 
     __slots__ = (
+        "_asked",
         "_asked_at",
+        "_first_guess",
+        "_matched_at",
         "_preemptive",
         "_preemptive_at",
         "_preemptive_period",
@@ -92,11 +98,14 @@ class AckNackSchedule:
         self.asked_sn = 0  # the highest number that was asked for; what lies above is news
         self.is_wanted = False  # a HEARTBEAT wants an answer, whether anything is missing or not
         self._preemptive = True
+        self._matched_at = math.inf
+        self._first_guess = NACK_REPEAT_FIRST
         self._preemptive_at = -math.inf
         self._preemptive_period = PREEMPTIVE_MIN
         self._repeat = NACK_REPEAT_FIRST
         self._response = -1.0  # smoothed seconds from asking to the answer; negative: none was measured yet
         self._asked_at = -math.inf
+        self._asked: dict[int, tuple[float, float]] = {}  # numbers that were asked for: when first, when last
 
     @property
     def is_preemptive(self) -> bool:
@@ -105,11 +114,15 @@ class AckNackSchedule:
 
     def matched(self, now: float) -> None:
         self.due = now
+        self._matched_at = now
 
-    def heartbeat_received(self) -> None:
+    def heartbeat_received(self, now: float) -> None:
+        """The first one ends the preemptive ACKNACKs; how long it took is a first guess of how long answers take."""
         if self._preemptive:
             self._preemptive = False
             self.due = math.inf
+            self._first_guess = min(max(1.5 * (now - self._matched_at), NACK_REPEAT_FIRST), 10 * NACK_REPEAT_FIRST)
+            self._repeat = self._first_guess
 
     def preemptive_sent(self, now: float) -> None:
         self._preemptive_at = now
@@ -133,26 +146,57 @@ class AckNackSchedule:
         """From when on the same may be asked for again."""
         return self._asked_at + self._repeat
 
-    def nack_sent(self, now: float, highest_sn: int) -> None:
-        """Asked, for numbers up to this one; if nothing comes, ask again later."""
-        if now >= self.repeat_due and self.asked_sn >= highest_sn:
+    def may_repeat(self, now: float) -> bool:
+        """May what was asked for be asked for again: is the answer overdue?"""
+        return now >= (self._asked_at + self._answer_time if self.is_wanted else self.repeat_due)
+
+    @property
+    def _answer_time(self) -> float:
+        """How long an answer takes, generously."""
+        if self._response < 0:
+            return self._first_guess
+        return min(max(2 * self._response + NACK_DELAY, NACK_REPEAT_MIN), NACK_REPEAT_MAX)
+
+    def nack_sent(self, now: float, numbers: Sequence[int], *, is_repeat: bool, next_sn: int) -> None:
+        """Asked for these (ascending, not empty); if nothing comes, ask again later.
+
+        ``is_repeat``: for the old ones too, else for news only.  ``next_sn``: the lowest number that is not here.
+        """
+        if is_repeat and self.asked_sn >= numbers[-1]:
             self._repeat = min(self._repeat * 2, NACK_REPEAT_MAX)
-        self._asked_at = now
-        self.asked_sn = max(self.asked_sn, highest_sn)
-        self.wait(self.repeat_due)
+        if is_repeat or next_sn > self.asked_sn:  # else the older ones count on from when they were asked for
+            self._asked_at = now
+        if len(self._asked) > _MAX_TIMED:
+            self._asked.clear()
+        for number in numbers:
+            first, _ = self._asked.get(number, (now, now))
+            self._asked[number] = (first, now)
+        self.asked_sn = max(self.asked_sn, numbers[-1])
+        self.wait(max(self.repeat_due, now + NACK_DELAY))
 
     def wait(self, until: float) -> None:
         """Answered what was wanted; more is missing, but it is not yet time to ask for it."""
         self.is_wanted = False
         self.due = until
 
-    def progress(self, now: float, sequence_number: int) -> None:
-        """This number, or a part of it, came.  If it had been asked for, this is how long an answer takes."""
-        if sequence_number > self.asked_sn or self._asked_at == -math.inf:
+    def arrived(self, now: float, sequence_number: int) -> None:
+        """This number, or a part of it, came.  If it had been asked for, the writer answers, and this is how fast.
+
+        Where it was asked for twice, nobody can tell which question is answered (Karn's rule for TCP), but this much:
+        the time since the last is a lower bound, and what comes right behind it answers an earlier one, which was
+        then repeated too soon.
+        """
+        if sequence_number > self.asked_sn:
             return
-        elapsed = now - self._asked_at
-        self._response = elapsed if self._response < 0 else self._response * 0.75 + elapsed * 0.25
-        self._repeat = min(max(2 * self._response + NACK_DELAY, NACK_REPEAT_MIN), NACK_REPEAT_MAX)
+        asked = self._asked.pop(sequence_number, None)
+        if asked is not None:
+            first, last = asked
+            if first == last or now - last < self._response / 2:
+                elapsed = now - first
+                self._response = elapsed if self._response < 0 else self._response * 0.75 + elapsed * 0.25
+            else:
+                self._response = max(self._response, now - last)
+        self._repeat = self._answer_time
 
     def complete(self) -> None:
         """Nothing is missing and nobody waits for an answer."""
@@ -160,3 +204,4 @@ class AckNackSchedule:
         if not self._preemptive:
             self.due = math.inf
             self._asked_at = -math.inf
+            self._asked.clear()

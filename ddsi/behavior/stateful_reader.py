@@ -22,6 +22,7 @@ from .writer_proxy import WriterProxy
 __all__ = ["ChangeSink", "RemoteWriter", "StatefulReader"]
 
 _MAX_NACK_FRAGS_AT_ONCE = 32
+_OLD_NUMBERS_OF_A_RESTART = 16
 
 
 class ChangeSink(Protocol):
@@ -142,7 +143,7 @@ class StatefulReader:
                 if not proxy.is_reliable:
                     return 0
                 if proxy.schedule.due != math.inf:
-                    proxy.schedule.progress(now, number)
+                    proxy.schedule.arrived(now, number)
                     proxy.note_missing(now)
                 return 0
         if proxy.is_reliable:
@@ -156,8 +157,9 @@ class StatefulReader:
         The first number received is taken as it is: what came before it was not for us.
         """
         number = change.sequence_number
-        if number < proxy.next_sn:
+        if number < proxy.next_sn and not self._begins_anew(proxy, number):
             return 0
+        proxy.contradictions = 0
         is_first = proxy.last_seq == 0
         lost = proxy.reorder.skip_to(number)  # what a GAP named is no loss
         proxy.reorder.head()
@@ -166,17 +168,27 @@ class StatefulReader:
         self.history.add(change, now)
         return 0 if is_first else lost
 
+    def _begins_anew(self, proxy: WriterProxy, number: int) -> bool:
+        """Many old numbers and not one that is new: the writer has restarted under the same GUID and counts from 1."""
+        proxy.contradictions += 1
+        if proxy.contradictions < _OLD_NUMBERS_OF_A_RESTART:
+            return False
+        proxy.reorder.next_sn, proxy.last_seq = number, 0
+        return True
+
     def _receive_reliable(self, proxy: WriterProxy, change: CacheChange, now: float) -> None:
         number = change.sequence_number
         if number < proxy.next_sn:
             return
         proxy.last_seq = max(proxy.last_seq, number)
         proxy.reorder.add(change)
+        proxy.schedule.arrived(now, number)
         self._progressed(proxy, now)
 
     def receive_gap(self, proxy: WriterProxy, start: int, numbers: NumberSet, now: float) -> None:
         """GAP.  RTPS 2.5 §8.3.8.4, §8.4.12.2.8."""
         proxy.irrelevant_change_set(start, numbers)
+        proxy.schedule.arrived(now, start)
         self._progressed(proxy, now)
 
     def receive_heartbeat(
@@ -192,11 +204,8 @@ class StatefulReader:
         return lost
 
     def _progressed(self, proxy: WriterProxy, now: float) -> None:
-        before = proxy.next_sn
         if not proxy.schedule.is_preemptive or not proxy.is_reliable:
             self._deliver(proxy, now)
-        if proxy.next_sn != before:
-            proxy.schedule.progress(now, before)
         if proxy.is_reliable:
             proxy.note_missing(now)
 
@@ -234,7 +243,7 @@ class StatefulReader:
             return []
         if schedule.is_preemptive:
             return [proxy.preemptive_acknack(now)]
-        may_repeat = now >= schedule.repeat_due
+        may_repeat = schedule.may_repeat(now)
         partial = self._partial_samples(proxy, remote)
         missing = proxy.missing_changes(excluded=partial, above=0 if may_repeat else schedule.asked_sn)
         silent = [
@@ -249,7 +258,8 @@ class StatefulReader:
             sample.asked_at = now
             out.append(proxy.nack_frag(number, sample.missing()))
         if missing or silent:
-            schedule.nack_sent(now, max([*missing, *(number for number, _ in silent)]))
+            asked = sorted([*missing, *(number for number, _ in silent)])
+            schedule.nack_sent(now, asked, is_repeat=may_repeat, next_sn=proxy.next_sn)
         elif partial:
             schedule.wait(now + FRAGMENT_SILENCE)
         elif not may_repeat and proxy.missing_changes():
@@ -271,6 +281,5 @@ class StatefulReader:
             return False
         if proxy.is_reliable:
             proxy.last_seq = max(proxy.last_seq, sequence_number - 1)
-            if proxy.schedule.due != math.inf and not proxy.schedule.is_preemptive:
-                proxy.schedule.progress(now, sequence_number)
+            proxy.schedule.arrived(now, sequence_number)
         return True

@@ -78,7 +78,8 @@ class WriterProxy:
         self.schedule = AckNackSchedule()
         self.last_seq = 0
         self.historical_sn = -1  # what the first HEARTBEAT said is there; -1: none came yet
-        self.contradictions = 0  # HEARTBEATs, one after the other, that do not know what was already delivered
+        # HEARTBEATs one after the other that do not know what was already delivered; best effort: samples below it.
+        self.contradictions = 0
         self.is_alive = True
         self.liveliness_due = math.inf
         self._acknack_count = 0
@@ -140,7 +141,7 @@ class WriterProxy:
         Before anything was received, numbers below ``first`` are no loss: they were never for this reader.
         """
         was_first = self.schedule.is_preemptive
-        self.schedule.heartbeat_received()
+        self.schedule.heartbeat_received(now)
         knew_any = self.last_seq > 0 or self.reorder.next_sn > 1
         # A writer that no longer has a number which it has already sent was written anew (RTPS 2.5 §8.2.3: they
         # ascend).
@@ -150,7 +151,7 @@ class WriterProxy:
         self.last_seq = max(self.last_seq, last)
         if self.historical_sn < 0:
             self.historical_sn = last
-        if not final:
+        if not final or self.contradictions:
             self.schedule.acknowledge(now)
         return lost if knew_any and not was_first and not self.uses_filter else 0
 
@@ -176,10 +177,11 @@ class WriterProxy:
     def acknack(self, missing: NumberSet) -> SendAckNack:
         """What is here and what is not.
 
-        Always final: no HEARTBEAT is wanted in return, but for those asked for data.
+        Final, as no HEARTBEAT is wanted in return but for data that is asked for.  Only a writer that has just
+        contradicted itself is to say again what it has.
         """
         self._acknack_count += 1
-        return SendAckNack(missing, self._acknack_count, final=True)
+        return SendAckNack(missing, self._acknack_count, final=not self.contradictions)
 
     def nack_frag(self, sequence_number: int, missing: NumberSet) -> SendNackFrag:
         self._nack_frag_count += 1

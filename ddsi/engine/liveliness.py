@@ -11,6 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ..behavior.stateful_reader import RemoteWriter
+from ..behavior.writer_proxy import WriterProxy
 from ..discovery.participant_message import ParticipantMessageData
 from ..discovery.participant_proxy import ParticipantProxy
 from ..structure.builtin_entity_ids import PARTICIPANT_MESSAGE_WRITER
@@ -19,7 +20,7 @@ from ..structure.discovered import DiscoveredWriterData
 from ..structure.errors import MalformedMessage
 from ..structure.guid import Guid
 from ..structure.qos_policies import Automatic, ManualByParticipant, ManualByTopic
-from .local_endpoints import LocalWriter
+from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -28,6 +29,7 @@ __all__ = ["Liveliness"]
 
 AUTOMATIC_KIND = b"\x00\x00\x00\x01"
 MANUAL_BY_PARTICIPANT_KIND = b"\x00\x00\x00\x02"
+_SHORTEST_LEASE_S = 0.01  # nobody can keep a shorter one, and trying to would be all that we do
 
 
 class Liveliness:
@@ -35,7 +37,7 @@ class Liveliness:
 
     def __init__(self, engine: Participant) -> None:
         self._engine = engine
-        self._asserted: dict[Guid, float] = {}  # remote manual-by-topic writers: when last
+        self._asserted: dict[Guid, float] = {}  # remote writers with a finite lease: when last, by themselves
 
     # --- our writers -------------------------------------------------------------------------------------
 
@@ -56,7 +58,7 @@ class Liveliness:
             for writer in self._engine.user_writers()
             if isinstance(writer.data.qos.liveliness, Automatic)
         ]
-        shortest = min(leases, default=math.inf)
+        shortest = max(min(leases, default=math.inf), _SHORTEST_LEASE_S)
         return shortest * 0.8 if shortest < 10 else shortest - 2
 
     def assert_automatic(self, now: float) -> None:
@@ -90,12 +92,21 @@ class Liveliness:
         if isinstance(policy, kind) and policy.lease_duration < math.inf:
             writer.assertion_due = now + policy.lease_duration
             self._engine.alarms.writer_liveliness(writer)
+            if writer.has_lost_liveliness:
+                writer.has_lost_liveliness = False
+                self._set_alive_here(writer, now, alive=True)
 
     def writer_due(self, writer: LocalWriter, now: float) -> None:
-        """Not asserted in time: the application is told, once."""
-        if writer.assertion_due <= now:
-            writer.assertion_due = math.inf
+        """Not asserted in time: the application is told, once, and so are the readers of this participant."""
+        if writer.assertion_due <= now and not writer.has_lost_liveliness:
+            writer.has_lost_liveliness = True
             self._engine.status(writer.guid, writer.liveliness_lost())
+            self._set_alive_here(writer, now, alive=False)
+
+    def _set_alive_here(self, writer: LocalWriter, now: float, *, alive: bool) -> None:
+        for guid in writer.behavior.local_readers:
+            reader = self._engine.local_readers[guid]
+            self._tell(reader, reader.behavior.writers[writer.guid], now, alive=alive)
 
     def _send(self, kind: bytes, now: float) -> None:
         message = ParticipantMessageData(self._engine.guid.prefix, kind, b"\0")
@@ -117,8 +128,7 @@ class Liveliness:
             return
         if message.kind == MANUAL_BY_PARTICIPANT_KIND:
             participant.last_manual_assertion = now
-        if participant.has_lost_liveliness:
-            self.revive(participant, now)
+            self._revive(participant, ManualByParticipant, now)
 
     def remote_writer_matched(self, data: DiscoveredWriterData, now: float) -> None:
         if data.qos.liveliness.lease_duration < math.inf:
@@ -148,7 +158,7 @@ class Liveliness:
             self._engine.alarms.remote_liveliness(guid, due)
             return
         participant = remote.participant
-        if isinstance(participant, ParticipantProxy):
+        if isinstance(participant, ParticipantProxy) and isinstance(remote.data.qos.liveliness, Automatic):
             participant.has_lost_liveliness = True
         self._set_alive(remote, now, alive=False)
 
@@ -164,27 +174,34 @@ class Liveliness:
         return self._asserted.get(remote.guid, 0.0)
 
     def revive(self, participant: ParticipantProxy, now: float) -> None:
-        """It speaks again: those of its writers whose kind is served by that are alive."""
+        """It speaks again: its automatic writers are alive."""
         participant.has_lost_liveliness = False
-        for remote in list(self._engine.remote_writers.values()):
-            if remote.participant is not participant or remote.guid not in self._asserted:
-                continue
-            if self._last_sign(remote) + remote.data.qos.liveliness.lease_duration > now:
+        self._revive(participant, Automatic, now)
+
+    def _revive(self, participant: ParticipantProxy, kind: type, now: float) -> None:
+        for guid in list(self._asserted):
+            remote = self._engine.remote_writers.get(guid)
+            if (
+                remote is not None
+                and remote.participant is participant
+                and isinstance(remote.data.qos.liveliness, kind)
+                and self._last_sign(remote) + remote.data.qos.liveliness.lease_duration > now
+            ):
                 self._set_alive(remote, now, alive=True)
-            else:
-                participant.has_lost_liveliness = True
 
     def _set_alive(self, remote: RemoteWriter, now: float, *, alive: bool) -> None:
-        engine = self._engine
         if alive:
-            engine.alarms.remote_liveliness(remote.guid, now + remote.data.qos.liveliness.lease_duration)
+            self._engine.alarms.remote_liveliness(remote.guid, now + remote.data.qos.liveliness.lease_duration)
         for behavior, proxy in remote.readers:
-            if proxy.is_alive == alive:
-                continue
-            proxy.is_alive = alive
-            reader = engine.local_readers[behavior.guid]
-            if not alive and reader.history is not None:
-                reader.history.writer_lost(remote.guid, now)
-            change = 1 if alive else -1
-            engine.status(reader.guid, reader.liveliness_changed(remote.guid, alive=change, not_alive=-change))
-            engine.recorder.liveliness(reader.guid, remote.guid, alive=alive)
+            self._tell(self._engine.local_readers[behavior.guid], proxy, now, alive=alive)
+
+    def _tell(self, reader: LocalReader, proxy: WriterProxy, now: float, *, alive: bool) -> None:
+        """One reader, about one of its writers, if it is news."""
+        if proxy.is_alive == alive:
+            return
+        proxy.is_alive = alive
+        if not alive and reader.history is not None:
+            reader.history.writer_lost(proxy.guid, now)
+        change = 1 if alive else -1
+        self._engine.status(reader.guid, reader.liveliness_changed(proxy.guid, alive=change, not_alive=-change))
+        self._engine.recorder.liveliness(reader.guid, proxy.guid, alive=alive)

@@ -58,6 +58,7 @@ class LocalWriter:
         "data",
         "guid",
         "has_fresh_samples",
+        "has_lost_liveliness",
         "incompatible",
         "inconsistent",
         "liveliness",
@@ -83,6 +84,7 @@ class LocalWriter:
         self.liveliness = LivelinessLost()
         self.timer_due = float("inf")
         self.assertion_due = float("inf")
+        self.has_lost_liveliness = False
         self.wants_acknowledgment = 0  # how many wait for its progress
 
     def match_changed(self, reader: Guid, change: int) -> Status:

@@ -267,13 +267,14 @@ class Matchmaker:
     def _unmatch_local(self, writer: LocalWriter, reader: LocalReader, reason: LossReason, now: float) -> None:
         engine = self._engine
         writer.behavior.matched_reader_remove(reader.guid, now)
-        reader.behavior.matched_writer_remove(writer.guid, now)
+        proxy = reader.behavior.matched_writer_remove(writer.guid, now)
+        alive = proxy is None or proxy.is_alive
         self._engine.recorder.unmatched(writer.guid, reader.guid, writer.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_lost(writer.guid, now)
         engine.status(writer.guid, writer.match_changed(reader.guid, -1))
         engine.status(reader.guid, reader.match_changed(writer.guid, -1))
-        engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-1, not_alive=0))
+        engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-int(alive), not_alive=int(alive) - 1))
         engine.writer_progressed(writer)
 
     # --- refusals ----------------------------------------------------------------------------------------

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 
+import pytest
+
 from ddsi.behavior.schedules import (
     HEARTBEAT_PERIOD_MAX,
     HEARTBEAT_PERIOD_MIN,
@@ -74,8 +76,13 @@ def test_progress_starts_over_and_completion_ends() -> None:
 def in_step() -> AckNackSchedule:
     """A reader that has heard its writer's first HEARTBEAT."""
     schedule = AckNackSchedule()
-    schedule.heartbeat_received()
+    schedule.heartbeat_received(0.0)
     return schedule
+
+
+def ask(schedule: AckNackSchedule, now: float, number: int, *, again: bool = False, next_sn: int = 1 << 30) -> None:
+    """Ask for a number; ``again``: and for those that were asked for before."""
+    schedule.nack_sent(now, [number], is_repeat=again, next_sn=next_sn)
 
 
 def test_preemptive_acknacks_repeat_ever_slower_until_the_first_heartbeat() -> None:
@@ -89,7 +96,7 @@ def test_preemptive_acknacks_repeat_ever_slower_until_the_first_heartbeat() -> N
     gaps = [round(later - earlier, 6) for earlier, later in itertools.pairwise(times)]
     assert gaps[:4] == [PREEMPTIVE_MIN, 2 * PREEMPTIVE_MIN, 4 * PREEMPTIVE_MIN, 8 * PREEMPTIVE_MIN]
     assert gaps[-1] == PREEMPTIVE_MAX
-    schedule.heartbeat_received()
+    schedule.heartbeat_received(0.0)
     assert not schedule.is_preemptive
     assert schedule.due == math.inf
 
@@ -126,7 +133,7 @@ def test_a_little_reordering_is_no_loss() -> None:
 
 def test_what_was_asked_for_is_not_asked_for_again_at_once() -> None:
     schedule = in_step()
-    schedule.nack_sent(1.0, 10)
+    ask(schedule, 1.0, 10)
     assert schedule.asked_sn == 10
     assert schedule.repeat_due == schedule.due == 1.0 + NACK_REPEAT_FIRST
     schedule.missing(1.01, is_news=False)
@@ -135,7 +142,7 @@ def test_what_was_asked_for_is_not_asked_for_again_at_once() -> None:
 
 def test_news_is_asked_for_soon_while_an_answer_is_under_way() -> None:
     schedule = in_step()
-    schedule.nack_sent(1.0, 10)
+    ask(schedule, 1.0, 10)
     schedule.missing(1.01, is_news=True)
     assert schedule.due == 1.01 + NACK_DELAY
 
@@ -145,7 +152,7 @@ def test_vain_questions_are_repeated_ever_slower() -> None:
     now = 0.0
     gaps = []
     for _ in range(10):
-        schedule.nack_sent(now, 10)
+        ask(schedule, now, 10, again=now > 0)
         gaps.append(round(schedule.due - now, 6))
         now = schedule.due
     assert gaps[:3] == [NACK_REPEAT_FIRST, 2 * NACK_REPEAT_FIRST, 4 * NACK_REPEAT_FIRST]
@@ -157,22 +164,94 @@ def test_the_time_to_repeat_is_learnt_from_the_answers() -> None:
     fast, slow = in_step(), in_step()
     now = 0.0
     for number in range(1, 20):
-        fast.nack_sent(now, number)
-        fast.progress(now + 0.0004, number)
-        slow.nack_sent(now, number)
-        slow.progress(now + 0.3, number)
+        ask(fast, now, number)
+        fast.arrived(now + 0.0004, number)
+        ask(slow, now, number)
+        slow.arrived(now + 0.3, number)
         now += 1.0
-    fast.nack_sent(now, 20)
-    slow.nack_sent(now, 20)
+    ask(fast, now, 20)
+    ask(slow, now, 20)
     assert round(fast.repeat_due - now, 6) == NACK_REPEAT_MIN
     assert 0.55 < slow.repeat_due - now < 0.7
 
 
+def test_the_first_heartbeat_gives_a_first_guess_of_the_time_of_answers() -> None:
+    """On a long link the first repairs are not asked for again before they can be here."""
+    for took, guess in ((0.0002, NACK_REPEAT_FIRST), (0.2, 0.3), (60.0, 10 * NACK_REPEAT_FIRST)):
+        schedule = AckNackSchedule()
+        schedule.matched(5.0)
+        schedule.heartbeat_received(5.0 + took)
+        ask(schedule, 100.0, 1)
+        assert schedule.repeat_due == pytest.approx(100.0 + guess)
+
+
+def test_a_heartbeat_lets_it_ask_again_when_the_answer_is_overdue() -> None:
+    """However long the pause has grown: the writer is there."""
+    schedule = in_step()
+    for _ in range(8):
+        ask(schedule, min(schedule.due, 1e6), 1, again=schedule.due < math.inf)
+    asked = schedule.due - NACK_REPEAT_MAX
+    assert not schedule.may_repeat(asked + 1.0)
+    schedule.acknowledge(asked + 1.0)
+    assert schedule.may_repeat(asked + 1.0)
+    assert not schedule.may_repeat(asked + NACK_REPEAT_FIRST / 2)
+
+
 def test_fresh_samples_say_nothing_about_the_time_of_answers() -> None:
     schedule = in_step()
-    schedule.nack_sent(0.0, 10)
-    schedule.progress(0.0001, 11)  # was not asked for
+    ask(schedule, 0.0, 10)
+    schedule.arrived(0.0001, 11)  # was not asked for
     assert schedule.repeat_due == NACK_REPEAT_FIRST
+
+
+def test_an_answer_after_a_repetition_gives_a_lower_bound() -> None:
+    """Nobody can tell which question it answers, but not one that was asked later than the last."""
+    schedule = in_step()
+    ask(schedule, 0.0, 10)
+    ask(schedule, 1.0, 10, again=True)
+    schedule.arrived(1.03, 10)
+    ask(schedule, 2.0, 20)
+    assert schedule.repeat_due == pytest.approx(2.0 + 2 * 0.03 + NACK_DELAY)
+
+
+def test_losses_do_not_make_a_fast_link_seem_slow() -> None:
+    """Every other repair is lost and asked for twice; the others still tell how fast answers come."""
+    schedule = in_step()
+    now = 0.0
+    for number in range(1, 41, 2):
+        schedule.nack_sent(now, [number, number + 1], is_repeat=False, next_sn=number)
+        schedule.arrived(now + 0.001, number)
+        again = schedule.repeat_due
+        schedule.nack_sent(again, [number + 1], is_repeat=True, next_sn=number + 1)
+        schedule.arrived(again + 0.001, number + 1)
+        now = again + 0.1
+    ask(schedule, now, 50)
+    assert schedule.repeat_due - now == pytest.approx(NACK_REPEAT_MIN)
+
+
+def test_a_link_that_is_slower_than_expected_is_found_to_be_so() -> None:
+    """Though each question is repeated before the first answer can be here."""
+    schedule = in_step()
+    now, repeated = 0.0, 0
+    for number in range(1, 40):
+        asked = now
+        ask(schedule, now, number)
+        while schedule.repeat_due < asked + 0.4:
+            repeated += 1
+            ask(schedule, schedule.repeat_due, number, again=True)
+        schedule.arrived(asked + 0.4, number)
+        now = asked + 1.0
+    assert repeated < 10
+
+
+def test_news_does_not_put_off_what_is_overdue() -> None:
+    schedule = in_step()
+    ask(schedule, 0.0, 10)
+    for step in range(1, 5):
+        ask(schedule, 0.01 * step, 10 + step, next_sn=5)
+    assert schedule.repeat_due == NACK_REPEAT_FIRST
+    ask(schedule, 0.045, 20, next_sn=15)
+    assert schedule.repeat_due == 0.045 + NACK_REPEAT_FIRST, "all of the older ones had come"
 
 
 # --- the window -----------------------------------------------------------------------------------------------------
