@@ -6,9 +6,10 @@ participant knows; what is said here follows from what both sides announce, judg
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import islice
 from typing import Literal
 
 from ..dcps import DomainParticipant
@@ -23,13 +24,26 @@ from ..structure.guid import Guid, GuidPrefix
 from ..structure.qos_policies import Property
 from ..structure.vendor import vendor_name
 
-__all__ = ["Census", "EndpointKind", "Pair", "SeenEndpoint", "SeenParticipant", "Selection", "take_census"]
+__all__ = [
+    "MOST_PAIRS",
+    "Census",
+    "EndpointKind",
+    "Pair",
+    "SeenEndpoint",
+    "SeenParticipant",
+    "Selection",
+    "take_census",
+]
 
 EndpointKind = Literal["writer", "reader"]
 
 # How vendors announce host, process name and process id: Cyclone DDS, Fast DDS, RTI Connext.
 _HOST_PROPERTIES = ("__Hostname", "fastdds.physical_data.host", "dds.sys_info.hostname")
 _PROCESS_PROPERTIES = ("__ProcessName", "dds.sys_info.executable_filepath")
+MOST_PAIRS = 1_000_000
+"""Pairs of a writer and a reader that are looked at.  Strangers may announce ten thousand of each for one topic, and
+nobody wants to wait for a hundred million judgements."""
+_Aspects = str
 _PID_PROPERTIES = ("__Pid", "fastdds.physical_data.process", "dds.sys_info.process_id")
 
 
@@ -148,7 +162,7 @@ class Census:
         return replace(self, participants=tuple(chosen))
 
     def pairs(self) -> Iterator[Pair]:
-        """Every writer with every reader of its topic."""
+        """Every writer with every reader of its topic; at most MOST_PAIRS."""
         return _pairs([endpoint.data for _, endpoint in self.endpoints()])
 
 
@@ -183,7 +197,31 @@ def _pairs(endpoints: list[DiscoveredEndpointData]) -> Iterator[Pair]:
             writers.append(data)
         elif isinstance(data, DiscoveredReaderData):
             readers.append(data)
-    for writers, readers in topics.values():
+    return islice(_judged(topics.values()), MOST_PAIRS)
+
+
+def _judged(
+    topics: Iterable[tuple[list[DiscoveredWriterData], list[DiscoveredReaderData]]],
+) -> Iterator[Pair]:
+    """Endpoints of one kind are usually alike in all that a judgement looks at: it is made once for all of them."""
+    judgements: dict[tuple[_Aspects, _Aspects], MatchRefusal | None] = {}
+    for writers, readers in topics:
+        sides = [(reader, _aspects(reader)) for reader in readers]
         for writer in writers:
-            for reader in readers:
-                yield Pair(writer, reader, judge(writer, reader))
+            offered = _aspects(writer)
+            for reader, requested in sides:
+                key = (offered, requested)
+                if key not in judgements:
+                    judgements[key] = judge(writer, reader)
+                yield Pair(writer, reader, judgements[key])
+
+
+def _aspects(data: DiscoveredEndpointData) -> _Aspects:
+    """All that :func:`~ddsi.discovery.matching.judge` looks at, as one text: texts keep their hash."""
+    qos = data.qos
+    return repr(
+        (
+            data.type_name, data.is_keyed, qos.partition, qos.reliability, qos.durability, qos.presentation, qos.deadline,
+            qos.latency_budget, qos.ownership, qos.liveliness, qos.destination_order, qos.data_representation,
+        )
+    )  # fmt: skip
