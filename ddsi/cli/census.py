@@ -219,9 +219,6 @@ def _judged(
 def _aspects(data: DiscoveredEndpointData) -> _Aspects:
     """All that :func:`~ddsi.discovery.matching.judge` looks at, as one text: texts keep their hash."""
     qos = data.qos
-    return repr(
-        (
-            data.type_name, data.is_keyed, qos.partition, qos.reliability, qos.durability, qos.presentation, qos.deadline,
-            qos.latency_budget, qos.ownership, qos.liveliness, qos.destination_order, qos.data_representation,
-        )
-    )  # fmt: skip
+    kinds = (qos.reliability, qos.durability, qos.ownership, qos.liveliness, qos.destination_order, qos.presentation)
+    times = (qos.deadline, qos.latency_budget)
+    return repr((data.type_name, data.is_keyed, qos.partition, kinds, times, qos.data_representation))

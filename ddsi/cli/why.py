@@ -9,9 +9,10 @@ from __future__ import annotations
 import argparse
 import difflib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import islice
 
 from ..structure.guid import Guid
 from ..trace.wording import count_text
@@ -30,8 +31,8 @@ SUMMARY = "say why endpoints of a topic do not match, and what to do"
 
 _MOST_SIMILAR = 3
 _MOST_NAMED = 4
-_MOST_COMPARED = 100_000
-"""Names compared with names, in all: it takes some tens of microseconds each."""
+_MOST_COMPARED = 20_000
+"""Names compared with names, in all: it takes a tenth of a millisecond each."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -107,19 +108,34 @@ def _lonely(census: Census) -> Iterator[Lonely]:
         kinds = by_topic.setdefault(endpoint.data.topic_name, {})
         kinds.setdefault(endpoint.kind, []).append(endpoint.data.guid)
     lonely = sorted(topic for topic, kinds in by_topic.items() if len(kinds) == 1)
+    candidates: dict[EndpointKind, _Names] = {
+        "writer": _Names(topic for topic, kinds in by_topic.items() if "reader" in kinds),
+        "reader": _Names(topic for topic, kinds in by_topic.items() if "writer" in kinds),
+    }
     for topic in lonely:
         ((kind, guids),) = by_topic[topic].items()
-        others = [name for name, of_name in by_topic.items() if name != topic and set(of_name) - {kind}]
-        yield Lonely(topic, kind, tuple(guids), _similar(topic, others[: _MOST_COMPARED // len(lonely)]))
+        similar = candidates[kind].similar(topic, _MOST_COMPARED // len(lonely))
+        yield Lonely(topic, kind, tuple(guids), similar)
 
 
-def _similar(topic: str, others: list[str]) -> tuple[str, ...]:
+class _Names:
     """Names that may have been meant: another case, a slip of the pen, a prefix such as that of ROS 2 (``rt/``)."""
-    plain = {name: name.lower().rpartition("/")[2] for name in others}
-    wanted = topic.lower().rpartition("/")[2]
-    same = [name for name in others if plain[name] == wanted]
-    close = set(difflib.get_close_matches(wanted, set(plain.values()), n=_MOST_SIMILAR))
-    return tuple(dict.fromkeys([*same, *(name for name in others if plain[name] in close)]))[:_MOST_SIMILAR]
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._by_plain: dict[str, list[str]] = {}
+        for name in names:
+            self._by_plain.setdefault(_plain(name), []).append(name)
+
+    def similar(self, topic: str, most_compared: int) -> tuple[str, ...]:
+        """The best few, of which those that differ in case or prefix alone come first."""
+        wanted = _plain(topic)
+        close = difflib.get_close_matches(wanted, islice(self._by_plain, most_compared), n=_MOST_SIMILAR)
+        found = [*self._by_plain.get(wanted, ()), *(name for plain in close for name in self._by_plain[plain])]
+        return tuple(dict.fromkeys(found))[:_MOST_SIMILAR]
+
+
+def _plain(name: str) -> str:
+    return name.lower().rpartition("/")[2]
 
 
 # --- for people ------------------------------------------------------------------------------------------------

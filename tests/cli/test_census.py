@@ -10,10 +10,13 @@ import trio
 
 import ddsi
 from ddsi import idl
+from ddsi.cli import census as census_module
 from ddsi.cli.census import Census, Selection, take_census
 from ddsi.cli.census_changes import changes
 from ddsi.cli.census_json import census_json, topics_json
 from ddsi.cli.census_tables import census_lines, who
+from ddsi.discovery.matching import judge
+from ddsi.structure import qos_policies as p
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.vendor import FAST_DDS
 
@@ -30,6 +33,41 @@ def test_pairs_are_of_one_topic() -> None:
     seen = census(writer("A"), writer("B", number=2), reader("B"), reader("B", number=2), reader("C", number=3))
     assert [(pair.writer.topic_name, pair.reader.guid[14]) for pair in seen.pairs()] == [("B", 1), ("B", 2)]
     assert all(pair.refusal is None for pair in seen.pairs())
+
+
+def test_a_judgement_serves_only_those_that_are_alike() -> None:
+    """Every policy that the rules look at makes a difference: each pair is judged as if it were the only one."""
+    variants = [
+        EndpointQos(),
+        EndpointQos(reliability=p.Reliable()),
+        EndpointQos(durability=p.TransientLocal()),
+        EndpointQos(presentation=p.Presentation(p.AccessScope.TOPIC)),
+        EndpointQos(deadline=p.Deadline(1)),
+        EndpointQos(latency_budget=p.LatencyBudget(1)),
+        EndpointQos(ownership=p.Exclusive()),
+        EndpointQos(liveliness=p.ManualByTopic(1)),
+        EndpointQos(liveliness=p.ManualByTopic(2)),
+        EndpointQos(destination_order=p.BySourceTimestamp()),
+        EndpointQos(partition=p.Partition("a")),
+        EndpointQos(data_representation=p.DataRepresentation(2)),
+    ]
+    numbered = list(enumerate(variants, 1))
+    seen = census(
+        *(writer(number=number, qos=qos) for number, qos in numbered),
+        *(reader(number=number, qos=qos) for number, qos in numbered),
+        writer(number=90, type_name="Other"), reader(number=91, keyed=False),
+    )  # fmt: skip
+    pairs = list(seen.pairs())
+    assert len(pairs) == 13 * 13
+    assert all(pair.refusal == judge(pair.writer, pair.reader) for pair in pairs)
+    assert {pair.refusal is None for pair in pairs} == {True, False}
+
+
+def test_pairs_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strangers may announce any number of endpoints of one topic."""
+    monkeypatch.setattr(census_module, "MOST_PAIRS", 10)
+    seen = census(*(writer(number=n) for n in range(1, 100)), *(reader(number=n) for n in range(1, 100)))
+    assert len(list(seen.pairs())) == 10
 
 
 @pytest.mark.parametrize(
