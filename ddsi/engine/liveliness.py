@@ -52,13 +52,18 @@ class Liveliness:
             self._engine.alarms.writer_liveliness(writer)
 
     def assertion_period(self) -> float:
-        """Seconds between automatic assertions: 80 % of the shortest lease below 10 s, else 2 s before its end."""
+        """Seconds between automatic assertions: 80 % of the shortest lease below 10 s, else 2 s before its end.
+
+        So that a lost one can be repaired in time; below half a second only the next one can come in time.
+        """
         leases = [
             writer.data.qos.liveliness.lease_duration
             for writer in self._engine.user_writers()
             if isinstance(writer.data.qos.liveliness, Automatic)
         ]
         shortest = max(min(leases, default=math.inf), _SHORTEST_LEASE_S)
+        if shortest < 0.5:
+            return shortest * 0.3
         return shortest * 0.8 if shortest < 10 else shortest - 2
 
     def assert_automatic(self, now: float) -> None:

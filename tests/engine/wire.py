@@ -64,7 +64,7 @@ class Stranger:
         self.prefix = GuidPrefix(VENDOR + number.to_bytes(10, "big"))
         self.guid = Guid.of(self.prefix, EntityId.PARTICIPANT)
         self.address = address or Locator.udp_v4(f"10.9.{number >> 8 & 255}.{number & 255}", 7410)
-        self._sn = 0
+        self._sn: dict[EntityId, int] = {}
 
     def message(self, *submessages: bytes) -> bytes:
         return Header(PROTOCOL_VERSION, VENDOR, self.prefix).encode() + b"".join(submessages)
@@ -120,8 +120,8 @@ class Stranger:
         return self._sedp(ids.SEDP_SUBSCRIPTIONS_WRITER, ids.SEDP_SUBSCRIPTIONS_READER, encode_reader(data))
 
     def _sedp(self, writer_id: EntityId, reader_id: EntityId, payload: bytes) -> bytes:
-        self._sn += 1
-        return self.message(Data(reader_id, writer_id, self._sn, None, payload).encode())
+        number = self._sn[writer_id] = self._sn.get(writer_id, 0) + 1
+        return self.message(Data(reader_id, writer_id, number, None, payload).encode())
 
     def directed(self, to: GuidPrefix, *submessages: bytes) -> bytes:
         return self.message(InfoDestination(to).encode(), *submessages)
