@@ -21,7 +21,7 @@ from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD
 from ..messages.gap import Gap
 from ..messages.heartbeat import Heartbeat, HeartbeatFrag
 from ..messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
-from ..messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages
+from ..messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages, submessage_name
 from ..serialization.parameter_id import ParameterId
 from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
 from ..spi import NoKeys, NotForUs, Octets, Outcome, Rejected
@@ -44,6 +44,9 @@ _INFO_TS = int(SubmessageKind.INFO_TS)
 _TIMESTAMP = struct.Struct("<II")
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
 _UNKNOWN_ID = bytes(4)
+# No writer gets that far in 100,000 years at a million samples a second.  Beyond it, what we add to a peer's numbers
+# might no longer fit the wire.
+_NUMBERS_END = 1 << 62
 _CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
 _UNKNOWN_PREFIX = bytes(12)
 
@@ -237,7 +240,7 @@ class Inbound:
         _, to_inline_qos, reader_id, writer_id, high, low = DATA_BODY.unpack_from(view, start)
         number = high << 32 | low
         payload_start = start + 4 + to_inline_qos
-        if number < 1 or to_inline_qos < 16 or to_inline_qos & 3 or end - payload_start < 4:
+        if not 0 < number < _NUMBERS_END or to_inline_qos < 16 or to_inline_qos & 3 or end - payload_start < 4:
             raise MalformedMessage(f"number {number}, octetsToInlineQos {to_inline_qos}", element="DATA", offset=start)
         remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
         if remote is None:
@@ -265,6 +268,7 @@ class Inbound:
         if not incoming.is_for_us:
             return
         data = Data.decode(raw.flags, raw.body)
+        _check_number(data.writer_sn, raw)
         inline = _InlineQos.read(data.inline_qos)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
@@ -377,6 +381,7 @@ class Inbound:
         if not incoming.is_for_us:
             return
         data = DataFrag.decode(raw.flags, raw.body)
+        _check_number(data.writer_sn, raw)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
             self._engine.dropped(DropReason.UNMATCHED, incoming.source)
@@ -453,6 +458,7 @@ class Inbound:
 
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
+        _check_number(heartbeat.last_sn, raw)
         restarted = False
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
             due = proxy.schedule.due
@@ -473,12 +479,14 @@ class Inbound:
     def _heartbeat_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         """RTPS 2.5 §8.3.8.7: ask at once for fragments that should be here.  Ignored for samples of which none is."""
         heartbeat = HeartbeatFrag.decode(raw.flags, raw.body)
+        _check_number(heartbeat.writer_sn, raw)
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
             if proxy.is_reliable and heartbeat.writer_sn >= proxy.next_sn:
                 self._engine.fragments_announced(local, proxy, heartbeat.writer_sn, heartbeat.last_fragment_num)
 
     def _gap(self, incoming: Incoming, raw: RawSubmessage) -> None:
         gap = Gap.decode(raw.flags, raw.body)
+        _check_number(max(gap.gap_start, gap.gap_list.end), raw)
         for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
             local.behavior.receive_gap(proxy, gap.gap_start, gap.gap_list, incoming.now)
             self._engine.proxy_touched(local.behavior, proxy)
@@ -494,6 +502,7 @@ class Inbound:
 
     def _acknack(self, incoming: Incoming, raw: RawSubmessage) -> None:
         acknack = AckNack.decode(raw.flags, raw.body)
+        _check_number(acknack.reader_sn_state.end, raw)
         if not incoming.is_for_us:
             return
         writer = self._engine.local_writers.get(Guid(self._own_prefix + acknack.writer_id))
@@ -515,6 +524,7 @@ class Inbound:
 
     def _nack_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         nack = NackFrag.decode(raw.flags, raw.body)
+        _check_number(nack.writer_sn, raw)
         if not incoming.is_for_us:
             return
         writer = self._engine.local_writers.get(Guid(self._own_prefix + nack.writer_id))
@@ -530,6 +540,11 @@ class Inbound:
             proxy, nack.writer_sn, nack.fragment_number_state, nack.count, incoming.now
         )
         self._engine.writer_answers(writer, answers)
+
+
+def _check_number(number: int, raw: RawSubmessage) -> None:
+    if number >= _NUMBERS_END:
+        raise MalformedMessage(f"no writer reaches {number}", element=submessage_name(raw.kind), offset=raw.offset)
 
 
 class _InlineQos:

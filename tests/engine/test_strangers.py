@@ -113,7 +113,7 @@ def test_our_own_announcement_that_comes_back_is_not_a_participant() -> None:
     assert sent(participant) == []
 
 
-# --- bounds and eviction ----------------------------------------------------------------------------------------------
+# --- bounds and eviction --------------------------------------------------------------------------------------------
 
 
 def test_invented_participants_fill_their_table_and_no_more() -> None:
