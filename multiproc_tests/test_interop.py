@@ -37,13 +37,20 @@ def _marks(*pair: Peer) -> list[pytest.MarkDecorator]:
 
 @async_test
 async def test_interop(case: Case, publisher: Peer, subscriber: Peer) -> None:
-    """The claim of the case holds between the two; see ``matrix/cases.py`` for the claims."""
+    """The claim of the case holds between the two; see ``matrix/cases.py`` for the claims.
+
+    A case with a foreign peer is played once more when it fails: how others take a late scheduler is not ours to judge.
+    Ours with ours has one chance.
+    """
     limit = known_limit(case.name, publisher.name, subscriber.name)
     try:
         await play(case, publisher, subscriber)
     except Unavailable:
         raise
     except AssertionError as error:
-        if limit is None:
+        if limit is not None:
+            pytest.xfail(f"{limit} ({error})")
+        if not any(peer in FOREIGN for peer in (publisher, subscriber)):
             raise
-        pytest.xfail(f"{limit} ({error})")
+        print(f"first attempt: {error}")
+        await play(case, publisher, subscriber)
