@@ -1,0 +1,392 @@
+"""The seam to security, seen from the engine: every moment is asked, and every answer is acted upon."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import pytest
+
+from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION
+from ddsi.simulation import Domain, Node
+from ddsi.spi import (
+    ADMITTED,
+    PENDING,
+    Admission,
+    Compute,
+    Decided,
+    HookEffect,
+    LocalParticipant,
+    NoKeys,
+    NotForUs,
+    Octets,
+    Outcome,
+    Overhead,
+    Parts,
+    Refused,
+    Rejected,
+    SendMessage,
+)
+from ddsi.spi.plaintext import Plaintext
+from ddsi.structure.cache_change import CacheChange, ChangeKind
+from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.errors import NotAllowedBySecurity
+from ddsi.structure.guid import Guid, GuidPrefix
+from ddsi.structure.qos import Qos
+from ddsi.structure.qos_policies import KeepAll, Reliable
+from ddsi.structure.status import SecurityRefused
+from ddsi.trace.reasons import DropReason
+
+RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
+
+
+class Hooks(Plaintext):
+    """Everything passes, unless a test says otherwise; what was asked is written down."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+        self.participants: Admission = ADMITTED
+        self.matches: Admission = ADMITTED
+        self.effects: list[HookEffect] = []
+        self.deadline = math.inf
+
+    def local_participant(self, candidate: LocalParticipant) -> Guid:
+        self.asked.append("local_participant")
+        return super().local_participant(candidate)
+
+    def remote_participant(self, data: DiscoveredParticipantData, now: float) -> Admission:
+        self.asked.append("remote_participant")
+        return self.participants
+
+    def remote_participant_lost(self, guid: Guid) -> None:
+        self.asked.append("remote_participant_lost")
+
+    def local_endpoint_deleted(self, guid: Guid) -> None:
+        self.asked.append("local_endpoint_deleted")
+
+    def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
+        self.asked.append("match")
+        return self.matches
+
+    def unmatch(self, local: Guid, remote: Guid) -> None:
+        self.asked.append("unmatch")
+
+    def handle_timeout(self, now: float) -> None:
+        self.asked.append("handle_timeout")
+        self.deadline = math.inf
+
+    def next_deadline(self) -> float:
+        return self.deadline
+
+    def drain_effects(self) -> Sequence[HookEffect]:
+        effects, self.effects = self.effects, []
+        return effects
+
+
+def pair(make_hooks: Callable[[], Hooks] = Hooks) -> tuple[Domain, Node, Node, Hooks]:
+    """Two nodes; the second has the hooks."""
+    domain = Domain()
+    hooks = make_hooks()
+    return domain, domain.node(), domain.node(make_hooks=lambda: hooks), hooks
+
+
+def test_the_moments_of_a_life_are_asked_in_order() -> None:
+    domain, a, b, hooks = pair()
+    a.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    domain.run_until(domain.all_matched, 1)
+    reader.delete()
+    a.close()
+    domain.run(1)
+    assert hooks.asked == [
+        "local_participant", "remote_participant", "match", "unmatch", "local_endpoint_deleted",
+        "remote_participant_lost",
+    ]  # fmt: skip
+
+
+def test_a_local_participant_may_be_refused() -> None:
+    class Refusing(Hooks):
+        def local_participant(self, candidate: LocalParticipant) -> Guid:
+            raise NotAllowedBySecurity("no identity")
+
+    with pytest.raises(NotAllowedBySecurity, match="no identity"):
+        pair(Refusing)
+
+
+def test_a_local_participant_may_get_another_guid() -> None:
+    class Adjusting(Hooks):
+        def local_participant(self, candidate: LocalParticipant) -> Guid:
+            return Guid(b"\x80" + candidate.guid[1:])
+
+    _, _, b, _ = pair(Adjusting)
+    assert b.engine.guid[0] == 0x80
+
+
+def test_a_refused_participant_is_known_but_nothing_is_matched() -> None:
+    domain, a, b, hooks = pair()
+    hooks.participants = Refused("not signed by our authority")
+    a.writer("Square", RELIABLE)
+    b.reader("Square", RELIABLE)
+    domain.run(3)
+    assert b.statuses_of(SecurityRefused) == [SecurityRefused(remote=a.guid, reason="not signed by our authority")]
+    assert len(b.engine.known_writers) == 0
+    assert b.engine.remote_writers == {}
+
+
+def test_a_pending_participant_is_matched_when_it_is_decided() -> None:
+    domain, a, b, hooks = pair()
+    hooks.participants = PENDING
+    a.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    domain.run(3)
+    assert reader.matched_count == 0
+    hooks.effects.append(Decided(b.guid, a.guid, ADMITTED))
+    b.pump()
+    assert domain.run_until(lambda: reader.matched_count == 1, 2)
+
+
+def test_a_pending_participant_that_is_refused_in_the_end_is_gone() -> None:
+    domain, a, b, hooks = pair()
+    hooks.participants = PENDING
+    domain.run(1)
+    hooks.effects.append(Decided(b.guid, a.guid, Refused("wrong signature")))
+    b.pump()
+    assert a.guid.prefix not in b.engine.participants
+    assert SecurityRefused(remote=a.guid, reason="wrong signature") in b.statuses_of(SecurityRefused)
+
+
+@pytest.mark.parametrize("admission", [ADMITTED, Refused("topic Square is denied to it")])
+def test_a_pending_pair_waits_for_its_decision(admission: Admission) -> None:
+    domain, a, b, hooks = pair()
+    hooks.matches = PENDING
+    writer = a.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    domain.run(1)
+    assert reader.matched_count == 0
+    hooks.effects.append(Decided(reader.guid, writer.guid, admission))
+    b.pump()
+    domain.run(1)
+    assert reader.matched_count == (admission is ADMITTED)
+    refused = b.statuses_of(SecurityRefused)
+    assert len(refused) == (admission is not ADMITTED)
+    hooks.effects.append(Decided(reader.guid, writer.guid, ADMITTED))  # nobody waits any more
+    b.pump()
+    assert reader.matched_count == (admission is ADMITTED)
+
+
+def test_a_refused_pair_is_kept_with_its_reason() -> None:
+    domain, a, b, hooks = pair()
+    hooks.matches = Refused("partition p is not in its permissions")
+    writer = a.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    domain.run(1)
+    refusal = b.engine.matchmaker.refusals[(reader.guid, writer.guid)]
+    assert refusal.offered == "partition p is not in its permissions"
+    assert b.statuses_of(SecurityRefused) == [
+        SecurityRefused(remote=writer.guid, reason="partition p is not in its permissions")
+    ]
+
+
+def test_slow_work_is_computed_elsewhere_and_comes_back() -> None:
+    class Computing(Hooks):
+        result: object = None
+
+        def computed(self, effect: Compute, result: object, now: float) -> None:
+            self.result = (effect, result, now)
+
+    domain, _, b, hooks = pair(Computing)
+    domain.run(1)
+    effect = Compute(subject=b.guid, generation=3, job=lambda: 6 * 7)
+    hooks.effects.append(effect)
+    b.pump()
+    assert isinstance(hooks, Computing)
+    assert hooks.result == (effect, 42, domain.now)
+
+
+def test_the_hooks_have_their_deadline() -> None:
+    domain, _, b, hooks = pair()
+    domain.run(1)
+    hooks.deadline = 5.0
+    b.pump()
+    domain.run(3)
+    assert "handle_timeout" not in hooks.asked
+    domain.run(2)
+    assert hooks.asked.count("handle_timeout") == 1
+
+
+# --- transform ------------------------------------------------------------------------------------------------------
+
+
+class Masking(Hooks):
+    """Each submessage of a user writer or reader is wrapped into SEC_PREFIX ... SEC_POSTFIX, each payload inverted."""
+
+    def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
+        return payload if writer.entity_id.is_builtin else _inverted(payload)
+
+    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        return payload if writer.entity_id.is_builtin else _inverted(payload)
+
+    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+        if sender.entity_id.is_builtin:
+            return submessage
+        body = b"".join(submessage)
+        wrapped = b"\x30\x01" + len(body).to_bytes(2, "little") + body
+        return (b"\x31\x01\x04\0prot", wrapped, b"\x32\x01\x04\0stop")
+
+    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+        return bytes(protected[12:-8])
+
+    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        return Overhead(submessage=20)
+
+    def admits_clear_submessage(self, sender: bytes) -> bool:
+        return Guid(sender).entity_id.is_builtin
+
+
+def _inverted(octets: Octets) -> bytes:
+    return bytes(octet ^ 0xFF for octet in bytes(octets))
+
+
+def secured(make: Callable[[], Hooks] = Masking) -> tuple[Domain, Node, Node]:
+    domain = Domain()
+    return domain, domain.node(make_hooks=make), domain.node(make_hooks=make)
+
+
+def test_protected_samples_and_fragments_arrive_and_messages_keep_their_size() -> None:
+    domain, a, b = secured()
+    writer, reader = a.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 1)
+    sizes: list[int] = []
+    seen: list[bytes] = []
+
+    def watch(sender: bytes, octets: bytes) -> None:
+        sizes.append(len(octets))
+        seen.append(octets)
+
+    domain.network.watch = watch
+    for size in (3, 1003, 10_003):
+        writer.write(size)
+    domain.run(2)
+    assert [len(change.payload) for _, change in reader.taken] == [8, 1008, 10_008]
+    assert reader.session(writer.guid).numbers == [1, 2, 3]
+    assert max(sizes) <= 1452
+    assert not any(bytes(writer.written[1].payload) in octets for octets in seen)
+
+
+def test_what_comes_in_clear_but_should_not_is_dropped_and_counted() -> None:
+    class Lax(Masking):
+        def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+            return submessage
+
+    domain = Domain()
+    a, b = domain.node(make_hooks=Lax), domain.node(make_hooks=Masking)
+    writer, reader = a.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+    domain.run(1)
+    writer.write()
+    writer.write(10_000)
+    domain.run(1)
+    assert reader.taken == []
+    assert b.engine.drops[DropReason.CLEAR_TEXT] > 3
+
+
+@pytest.mark.parametrize(
+    ("outcome", "reason"),
+    [
+        (NotForUs(), DropReason.NOT_FOR_US),
+        (NoKeys(b"\1\2"), DropReason.NO_KEYS),
+        (Rejected("the MAC is wrong"), DropReason.REJECTED_BY_SECURITY),
+    ],
+)
+@pytest.mark.parametrize("level", ["decode_payload", "decode_submessage"])
+def test_what_does_not_decode_is_dropped_with_its_outcome(outcome: Outcome, reason: DropReason, level: str) -> None:
+    class Failing(Masking):
+        pass
+
+    def fail(self: Failing, subject: Guid | Octets, other: Octets | GuidPrefix) -> Octets | Outcome:
+        is_builtin = isinstance(subject, Guid) and subject.entity_id.is_builtin
+        return bytes(other) if is_builtin else outcome
+
+    setattr(Failing, level, fail)
+    domain = Domain()
+    a, b = domain.node(make_hooks=Masking), domain.node(make_hooks=Failing)
+    writer, reader = a.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+    domain.run(1)
+    writer.write()
+    domain.run(0.2)
+    assert reader.taken == []
+    assert b.engine.drops[reason] > 0
+
+
+def test_a_whole_message_that_does_not_decode_is_dropped() -> None:
+    class Wrapping(Hooks):
+        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+            octets = b"".join(message)
+            return (octets[:20], b"\x33\x01\x04\0wrap", octets[20:])
+
+    class Unwrapping(Hooks):
+        def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+            return bytes(message[:20]) + bytes(message[28:])
+
+    for receiving, expected in ((Hooks, 0), (Unwrapping, 1)):
+        domain = Domain()
+        a, b = domain.node(make_hooks=Wrapping), domain.node(make_hooks=receiving)
+        writer, reader = a.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+        domain.run(2)
+        writer.write()
+        domain.run(2)
+        assert len(reader.taken) == expected
+        assert (b.engine.drops[DropReason.NOT_FOR_US] > 0) is (expected == 0)
+
+
+# --- messages to one participant ------------------------------------------------------------------------------------
+
+
+def _messenger() -> tuple[Domain, Node, list[Node], Hooks]:
+    """A node whose hooks can send by a filtering writer, and three that listen."""
+    domain = Domain()
+    hooks = Hooks()
+    sender = domain.node(make_hooks=lambda: hooks)
+    sender.writer("keys", RELIABLE, filters=True)
+    listeners = [domain.node() for _ in range(3)]
+    for node in listeners:
+        node.reader("keys", RELIABLE, uses_filter=True)
+    assert domain.run_until(domain.all_matched, 2)
+    return domain, sender, listeners, hooks
+
+
+def _message(sender: Node, to: Node, text: bytes) -> SendMessage:
+    writer = sender.writers[0]
+    change = CacheChange(ChangeKind.ALIVE, writer.guid, 0, b"\0\1\0\0" + text, destination=to.guid)
+    return SendMessage(writer.guid.entity_id, change)
+
+
+def test_a_message_of_the_hooks_goes_to_its_participant_alone() -> None:
+    domain, sender, listeners, hooks = _messenger()
+    hooks.effects += [_message(sender, node, b"to" + node.name.encode()) for node in listeners]
+    sender.pump()
+    domain.run(1)
+    for node in listeners:
+        (received,) = node.readers[0].taken
+        assert bytes(received[1].payload[4:7]) == b"to" + node.name.encode()
+
+
+def test_a_participant_that_never_acknowledges_is_given_up_and_nobody_else_waits() -> None:
+    """Its share of the history is full: what was begun with it is dropped, as if it had gone."""
+    domain, sender, listeners, hooks = _messenger()
+    silent, *others = listeners
+    domain.network.unplug(silent.host)
+    for number in range(MAX_CHANGES_PER_DESTINATION + 1):
+        hooks.effects.append(_message(sender, silent, b"%04d" % number))
+        sender.pump()
+        if number % 50 == 0:
+            hooks.effects.append(_message(sender, others[0], b"%04d" % number))
+            sender.pump()
+    assert silent.guid.prefix not in sender.engine.participants
+    assert "remote_participant_lost" in hooks.asked
+    behavior = sender.writers[0].local.behavior
+    assert silent.readers[0].guid not in behavior.readers
+    domain.run(1)
+    assert len(others[0].readers[0].taken) == 6
+    assert len(behavior.cache) == 0
+    domain.network.heal()
+    assert domain.run_until(domain.all_matched, 30), "it may begin anew"
