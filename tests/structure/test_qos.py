@@ -1,79 +1,139 @@
-"""Qos: one frozen value; what is not set is resolved as the OMG's tables say; nonsense is refused by name."""
+"""Qos: what is asked for, how two are merged, what is resolved, and what contradicts itself."""
 
 from __future__ import annotations
 
 import math
-import pickle
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
-from ddsi.structure import qos_policies as p
-from ddsi.structure.errors import BadParameter, InconsistentPolicy
-from ddsi.structure.qos import Qos, reader_qos, writer_qos
-from ddsi.structure.time import Time, duration_from_wire, duration_to_wire, ticks_from_nanoseconds
+from ddsi.structure.errors import BadParameter, DdsError, DdsTimeout, InconsistentPolicy, MalformedMessage
+from ddsi.structure.qos import EndpointQos, Qos, reader_qos, writer_qos
+from ddsi.structure.qos_policies import (
+    Automatic,
+    BestEffort,
+    BinaryProperty,
+    DataRepresentation,
+    Deadline,
+    KeepAll,
+    KeepLast,
+    LatencyBudget,
+    Lifespan,
+    ManualByTopic,
+    Partition,
+    Persistent,
+    Property,
+    Reliable,
+    ResourceLimits,
+    TimeBasedFilter,
+    Transient,
+    TransientLocal,
+    UserData,
+    Volatile,
+)
 
 
-def test_writers_are_reliable_and_readers_best_effort_by_default() -> None:
-    assert writer_qos(Qos()).reliability == p.Reliable(max_blocking_time=0.1)
-    assert reader_qos(Qos()).reliability == p.BestEffort()
-    assert writer_qos(Qos()).history == p.KeepLast(1)
-    assert reader_qos(Qos()).durability == p.Volatile()
+def test_what_is_not_set_has_the_omgs_default_for_its_entity() -> None:
+    """DDS 1.4 §2.2.3: writers are reliable, readers best effort; all else is alike."""
+    writer, reader = writer_qos(Qos()), reader_qos(Qos())
+    assert (writer.reliability, reader.reliability) == (Reliable(0.1), BestEffort())
+    for qos in (writer, reader):
+        assert (qos.durability, qos.history, qos.deadline) == (Volatile(), KeepLast(1), Deadline(math.inf))
+        assert (qos.liveliness, qos.lifespan, qos.partition.names) == (Automatic(math.inf), Lifespan(math.inf), ())
+    assert writer.is_reliable
+    assert not reader.is_reliable
 
 
-def test_the_right_side_wins_a_merge_and_properties_are_merged_one_by_one() -> None:
-    left = Qos(history=p.KeepAll(), deadline=p.Deadline(1), properties={"a": "1", "b": "1"})
-    right = Qos(history=p.KeepLast(3), properties={"b": "2"})
+def test_the_right_side_wins_and_properties_are_merged() -> None:
+    left = Qos(history=KeepAll(), deadline=Deadline(1), properties={"a": "1", "b": "1"})
+    right = Qos(history=KeepLast(3), properties={"b": "2"})
     merged = left | right
-    assert merged.history == p.KeepLast(3)
-    assert merged.deadline == p.Deadline(1)
+    assert (merged.history, merged.deadline) == (KeepLast(3), Deadline(1))
     assert merged.properties == {"a": "1", "b": "2"}
-    assert left.history == p.KeepAll()
+    assert (left.history, dict(left.properties)) == (KeepAll(), {"a": "1", "b": "1"}), "both stay as they were"
+    assert Qos() | left == left
+    with pytest.raises(TypeError):
+        left | 3  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(
-    ("make", "text"),
+    ("durability", "keeps"), [(Volatile(), False), (TransientLocal(), True), (Transient(), True), (Persistent(), True)]
+)
+def test_the_kinds_beyond_transient_local_keep_history_too(
+    durability: Volatile | TransientLocal | Transient | Persistent, keeps: bool
+) -> None:
+    assert writer_qos(Qos(durability=durability)).is_transient_local is keeps
+
+
+@pytest.mark.parametrize(
+    ("qos", "text"),
     [
-        (lambda: Qos(reliability=p.KeepAll()), r"reliability.*Reliable\(\.\.\.\) or BestEffort"),  # type: ignore[arg-type]
-        (lambda: p.KeepLast(0), "depth.*1 or more"),
-        (lambda: p.Deadline(-1), "Deadline.period.*seconds"),
-        (lambda: p.Deadline(math.nan), "Deadline.period"),
-        (lambda: p.ResourceLimits(max_samples=0), "max_samples"),
-        (lambda: p.OwnershipStrength(1 << 31), "int32"),
-        (lambda: p.Partition(["a"]), "Partition"),  # type: ignore[arg-type]
-        (lambda: p.UserData("text"), "bytes"),  # type: ignore[arg-type]
+        (
+            Qos(history=KeepLast(5), resource_limits=ResourceLimits(max_samples_per_instance=4)),
+            "raise the limit or lower the depth",
+        ),
+        (Qos(resource_limits=ResourceLimits(max_samples=2, max_samples_per_instance=3)), "max_samples=2 is below"),
+        (Qos(deadline=Deadline(1), time_based_filter=TimeBasedFilter(2)), "it could never be met"),
     ],
 )
-def test_nonsense_is_refused_by_name(make: Any, text: str) -> None:
-    with pytest.raises(BadParameter, match=text):
-        make()
+def test_policies_that_contradict_each_other_are_refused(qos: Qos, text: str) -> None:
+    for resolve in (writer_qos, reader_qos):
+        with pytest.raises(InconsistentPolicy, match=text):
+            resolve(qos)
 
 
-def test_contradictions_are_refused_with_both_values() -> None:
-    with pytest.raises(InconsistentPolicy, match=r"10.*max_samples_per_instance=5"):
-        writer_qos(Qos(history=p.KeepLast(10), resource_limits=p.ResourceLimits(max_samples_per_instance=5)))
-    with pytest.raises(InconsistentPolicy, match=r"deadline\.period=1"):
-        reader_qos(Qos(deadline=p.Deadline(1), time_based_filter=p.TimeBasedFilter(2)))
+@pytest.mark.parametrize(
+    ("policy", "arguments"),
+    [
+        (KeepLast, (0,)),
+        (KeepLast, (1.5,)),
+        (Reliable, (-1,)),
+        (Reliable, (math.nan,)),
+        (Deadline, ("1",)),
+        (Lifespan, (-0.1,)),
+        (LatencyBudget, (None,)),
+        (ManualByTopic, (-1,)),
+        (Partition, (["a"],)),
+        (UserData, ("text",)),
+        (DataRepresentation, (7,)),
+        (ResourceLimits, (0,)),
+        (ResourceLimits, (1, -2)),
+    ],
+)
+def test_values_that_cannot_be_meant_are_refused_at_once(
+    policy: Callable[..., object], arguments: tuple[object, ...]
+) -> None:
+    with pytest.raises(BadParameter):
+        policy(*arguments)
 
 
-def test_property_values_are_never_shown() -> None:
-    qos = Qos(
-        properties={"dds.sec.auth.password": "secret", "b": p.Property("secret"), "c": p.BinaryProperty(b"secret")}
-    )
-    assert "secret" not in repr(qos)
-    assert "secret" not in repr(p.Property("secret"))
+def test_a_policy_in_the_wrong_place_is_named_with_what_belongs_there() -> None:
+    with pytest.raises(BadParameter, match=r"Qos\(durability=\.\.\.\) takes Volatile\(\.\.\.\) or TransientLocal"):
+        Qos(durability=Reliable())  # type: ignore[arg-type]
+    with pytest.raises(BadParameter, match="property 'x'"):
+        Qos(properties={"x": 3})  # type: ignore[dict-item]
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.1, 0.05, 1.5, 100.0, 3600.25, math.inf])
-def test_durations_come_back_as_the_numbers_that_people_wrote(seconds: float) -> None:
-    assert duration_from_wire(*duration_to_wire(seconds)) == seconds
+def test_a_repr_shows_what_was_set_and_no_secret() -> None:
+    assert repr(Qos(history=KeepAll())) == "Qos(history=KeepAll())"
+    secret = Qos(properties={"b": Property("hush"), "a": BinaryProperty(b"hush"), "c": "hush"})
+    assert repr(secret) == "Qos(properties=<a, b, c>)"
+    assert "hush" not in repr(secret.properties["a"])
+    assert "hush" not in repr(secret.properties["b"])
 
 
-def test_a_time_is_a_float_that_keeps_its_nanoseconds() -> None:
-    time = Time.from_nanoseconds(1_700_000_000_123_456_789)
-    assert time.nanoseconds == 1_700_000_000_123_456_789
-    assert abs(time - 1_700_000_000.123456789) < 1e-6
-    assert time.ticks == ticks_from_nanoseconds(1_700_000_000_123_456_789)
-    assert pickle.loads(pickle.dumps(time)).ticks == time.ticks
-    with pytest.raises(ValueError, match="1970"):
-        Time.from_seconds(-1)
+def test_qos_is_a_value() -> None:
+    assert Qos(partition=Partition("a", "b")) == Qos(partition=Partition("a", "b"))
+    assert hash(Partition("a")) == hash(Partition("a"))
+    assert EndpointQos() == EndpointQos()
+    with pytest.raises(AttributeError):
+        Qos().history = KeepAll()  # type: ignore[misc]
+
+
+def test_whose_fault_an_error_is_stands_in_its_type() -> None:
+    assert issubclass(DdsTimeout, TimeoutError)
+    assert issubclass(BadParameter, ValueError)
+    assert not issubclass(MalformedMessage, DdsError), "a peer's fault never reaches the application"
+    error = MalformedMessage("too short", element="HEARTBEAT", offset=24)
+    assert str(error) == "HEARTBEAT at octet 24: too short"
+    assert (str(MalformedMessage("why")), str(MalformedMessage("why", offset=3))) == ("why", "why at octet 3")
