@@ -68,3 +68,8 @@ def test_it_wants_nothing() -> None:
     PLAINTEXT.local_endpoint_deleted(GUID)
     assert PLAINTEXT.next_deadline() == math.inf
     assert list(PLAINTEXT.drain_effects()) == []
+
+
+def test_properties_of_a_candidate_are_not_shown() -> None:
+    candidate = LocalParticipant(guid=GUID, domain_id=0, domain_tag="", properties={"dds.sec.auth.password": "secret"})
+    assert "secret" not in repr(candidate)
