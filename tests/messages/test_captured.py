@@ -24,7 +24,7 @@ from tests.captures.capture import PLAIN, SECURED, load
 
 
 def test_captures_are_there() -> None:
-    assert (len(PLAIN), len(SECURED)) == (21, 4)
+    assert (len(PLAIN), len(SECURED)) == (21, 25)
 
 
 @pytest.mark.parametrize("name", PLAIN + SECURED)
