@@ -148,6 +148,14 @@ class Authentication(Protocol):
         """§8.3.2.11.8.  Once the handshake is OK or OK_FINAL_MESSAGE; access control validates permissions with it."""
         ...
 
+    def get_subject_name(self, handle: IdentityHandle) -> str:
+        """The subject of the certificate, as RFC 4514 text; of a remote one, once its handshake is OK.
+
+        Access control finds the grant by it.  Not the OMG's, which lets access control read the property
+        ``dds.cert.sn`` of the identity token: vendors write that text in forms that cannot be compared.
+        """
+        ...
+
     def get_identity_token(self, handle: IdentityHandle) -> IdentityToken:
         """§8.3.2.11.9.  What the participant announces in the clear."""
         ...

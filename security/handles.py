@@ -33,9 +33,32 @@ class HandshakeHandle:
 
 
 class SharedSecretHandle:
-    """What both sides of a handshake know and nobody else does (§8.3.2).  No repr of it shows a secret."""
+    """What both sides of a handshake know and nobody else does (§8.3.2.5).  No repr of it shows a secret.
 
-    __slots__ = ()
+    The one handle whose content is laid down (§9.3.2.5.3), as key factory and authentication may come from two hands:
+    ``challenge1`` of the initiator, ``challenge2`` of the replier, and the secret, the hash of what they agreed on.
+    ``is_replier``: we answered the handshake, so ours is the higher Guid of the two.
+    """
+
+    __slots__ = ("_secret", "challenge1", "challenge2", "is_replier")
+
+    def __init__(self, challenge1: bytes, challenge2: bytes, shared_secret: bytes, *, is_replier: bool) -> None:
+        self.challenge1 = challenge1
+        self.challenge2 = challenge2
+        self.is_replier = is_replier
+        self._secret = bytearray(shared_secret)
+
+    @property
+    def shared_secret(self) -> bytes:
+        """Empty once it was wiped."""
+        return bytes(self._secret)
+
+    def wipe(self) -> None:
+        self._secret[:] = bytes(len(self._secret))
+        self._secret.clear()
+
+    def __repr__(self) -> str:
+        return f"<SharedSecretHandle of the {'replier' if self.is_replier else 'initiator'}>"
 
 
 class PermissionsHandle:

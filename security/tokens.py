@@ -1,14 +1,20 @@
-"""DataHolder: the shape of every token that plugins exchange.  DDS-Security 1.1 §7.2.3 (DataHolder), §7.2.4 (Token).
+"""DataHolder: the shape of every token that plugins exchange, and its octets.
 
-Values only.  A token that names a protocol, a certificate or a key is a DataHolder with a class id of its own; which
-properties it has, the plugin says whose it is.  The core carries tokens without reading them.
+DDS-Security 1.1 §7.2.3 (DataHolder), §7.2.4 (Token), §7.3.2 (its CDR).  A token that names a protocol, a certificate
+or a key is a DataHolder with a class id of its own; which properties it has, the plugin says whose it is.  The core
+carries tokens without reading them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
+
+from ddsi.serialization import Reader, Writer
 
 __all__ = [
+    "MAX_PROPERTIES",
     "NIL",
     "AuthRequestMessageToken",
     "AuthenticatedPeerCredentialToken",
@@ -20,7 +26,13 @@ __all__ = [
     "PermissionsCredentialToken",
     "PermissionsToken",
     "Token",
+    "read_data_holder",
+    "serialize_binary_properties",
+    "write_data_holder",
 ]
+
+MAX_PROPERTIES: Final = 64
+"""No known token has more than twelve; a count from the network above this is malformed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,3 +71,48 @@ AuthenticatedPeerCredentialToken = DataHolder
 PermissionsToken = DataHolder
 PermissionsCredentialToken = DataHolder
 CryptoToken = DataHolder
+
+
+def write_data_holder(writer: Writer, holder: DataHolder) -> None:
+    """As plain CDR: class id, properties, binary properties, each sequence with its count (§7.3.2)."""
+    writer.string(holder.class_id)
+    writer.sequence_length(len(holder.properties))
+    for name, text in holder.properties:
+        writer.string(name)
+        writer.string(text)
+    _write_binary_properties(writer, holder.binary_properties)
+
+
+def read_data_holder(reader: Reader) -> DataHolder:
+    """The mirror of :func:`write_data_holder`; untrusted.  Raises MalformedMessage and nothing else.
+
+    A peer of version 1.0 ends behind the properties: octets that are missing altogether are no binary properties.
+    """
+    class_id = reader.string()
+    properties = []
+    for _ in range(reader.sequence_length(most=MAX_PROPERTIES)):
+        name = reader.string()
+        properties.append((name, reader.string()))
+    binary_properties = []
+    if reader.remaining >= 4:
+        for _ in range(reader.sequence_length(most=MAX_PROPERTIES)):
+            name = reader.string()
+            binary_properties.append((name, bytes(reader.octet_sequence())))
+    return DataHolder(class_id, tuple(properties), tuple(binary_properties))
+
+
+def serialize_binary_properties(properties: Sequence[tuple[str, bytes]]) -> bytes:
+    """A BinaryPropertySeq in big-endian CDR without encapsulation: what hashes and signatures cover (§9.3.2.5.1).
+
+    Nothing follows the octets of the last property, no padding either.
+    """
+    writer = Writer(little_endian=False)
+    _write_binary_properties(writer, properties)
+    return writer.getvalue()
+
+
+def _write_binary_properties(writer: Writer, properties: Sequence[tuple[str, bytes]]) -> None:
+    writer.sequence_length(len(properties))
+    for name, octets in properties:
+        writer.string(name)
+        writer.octet_sequence(octets)

@@ -39,7 +39,7 @@ OPERATIONS = {
     "AccessControlListener": "on_revoke_permissions",
 }
 OURS = {
-    "Authentication": {"next_deadline", "handle_timeout"},
+    "Authentication": {"get_subject_name", "next_deadline", "handle_timeout"},
     "AccessControl": {"next_deadline", "handle_timeout", "return_permissions_handle"},
     "CryptoTransform": {"overhead"},
     "DataTagging": {"get_data_tags"},
