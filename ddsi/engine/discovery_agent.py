@@ -6,6 +6,7 @@ bound here.  A participant is admitted by the hooks before any of its endpoints 
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,9 @@ if TYPE_CHECKING:
 
 __all__ = ["DiscoveryAgent"]
 
+_KEEP_FAREWELLS_S = 600.0
+_MAX_FAREWELLS = 8192
+
 
 class DiscoveryAgent:
     """SPDP and SEDP of one participant."""
@@ -64,7 +68,8 @@ class DiscoveryAgent:
         self._announcer = SpdpAnnouncer(announce_to, engine.config.announcement_period, engine.random.random)
         self._eviction = Eviction(engine)
         self._ignored: set[Guid] = set()
-        self._disposed_announcements: list[tuple[EntityId, int]] = []
+        # "Endpoint gone", oldest first: said when, by which builtin writer, under which number.
+        self._farewells: deque[tuple[float, EntityId, int]] = deque()
 
     # --- ourselves ---------------------------------------------------------------------------------------
 
@@ -327,25 +332,31 @@ class DiscoveryAgent:
         self._announce_gone(ids.SEDP_SUBSCRIPTIONS_WRITER, guid, now)
 
     def _announce(self, writer_id: EntityId, guid: Guid, payload: bytes, now: float) -> None:
-        self._prune_disposed()
+        self._prune_farewells(now)
         self._engine.write_builtin(writer_id, ChangeKind.ALIVE, payload, guid, now)
 
     def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float) -> None:
-        self._prune_disposed()
+        self._prune_farewells(now)
         payload = encode_key(guid, ParameterId.ENDPOINT_GUID)
         change = self._engine.write_builtin(writer_id, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, payload, guid, now)
-        self._disposed_announcements.append((writer_id, change.sequence_number))
+        self._farewells.append((now, writer_id, change.sequence_number))
 
-    def _prune_disposed(self) -> None:
-        """Forget "endpoint gone" once all who were told have it: latecomers never knew the endpoint."""
-        waiting = []
-        for writer_id, number in self._disposed_announcements:
-            cache = self._engine.local_writers[Guid.of(self._engine.guid.prefix, writer_id)].behavior.cache
-            if number <= cache.acked_sn:
-                cache.remove(number)
-            else:
-                waiting.append((writer_id, number))
-        self._disposed_announcements = waiting
+    def _prune_farewells(self, now: float) -> None:
+        """Forget "endpoint gone" once nobody can lack it any more: latecomers never knew the endpoint.
+
+        That all who are matched have acknowledged it is not enough.  A peer that we lost may not have lost us: when it
+        hears us again, it has to learn what ended meanwhile.  But it forgets us when it hears nothing for our lease;
+        twice that leaves it time to ask.
+        """
+        keep = min(2 * self.data.lease_duration, _KEEP_FAREWELLS_S)
+        while self._farewells:
+            said_at, writer_id, number = self._farewells[0]
+            behavior = self._engine.local_writers[Guid.of(self._engine.guid.prefix, writer_id)].behavior
+            is_settled = now - said_at > keep and number <= behavior.min_acked_sn()
+            if not is_settled and len(self._farewells) <= _MAX_FAREWELLS:
+                break
+            self._farewells.popleft()
+            behavior.cache.remove(number)
 
     # --- their endpoints ---------------------------------------------------------------------------------
 

@@ -365,7 +365,7 @@ def test_endpoints_that_are_deleted_are_unmatched_at_once() -> None:
 
 
 def test_a_thousand_endpoints_come_and_go_without_a_trace() -> None:
-    """Of "endpoint gone" nothing is kept once all who were told have it: latecomers never knew the endpoint."""
+    """Of "endpoint gone" nothing is kept once nobody can lack it: latecomers never knew the endpoint."""
     domain = Domain()
     a, b = domain.node(), domain.node()
     domain.run_until(domain.are_introduced, 5)
@@ -373,7 +373,7 @@ def test_a_thousand_endpoints_come_and_go_without_a_trace() -> None:
         for endpoint in (a.writer("x", RELIABLE), a.reader("y", RELIABLE)):
             endpoint.delete()
         domain.run(0.2)
-    domain.run(5)
+    domain.run(2 * a.setup.config.lease_duration + 1)
     a.writer("last")
     domain.run(5)
     for writer in a.engine.local_writers.values():
@@ -383,6 +383,25 @@ def test_a_thousand_endpoints_come_and_go_without_a_trace() -> None:
     late = domain.node()
     domain.run(5)
     assert len(late.engine.known_writers) == 1
+
+
+def test_what_ended_while_only_we_had_lost_a_peer_is_told_when_it_hears_us_again() -> None:
+    """It never noticed the outage, so it would believe in the endpoint as long as we live."""
+    domain = Domain()
+    a = domain.node(config=Config(lease_duration=60.0))
+    b = domain.node(config=Config(lease_duration=3.0))
+    writer, reader = a.writer("Square", LATE), b.reader("Square", LATE)
+    assert domain.run_until(domain.all_matched, 5)
+    domain.network.partition([a.host], [b.host])
+    domain.run(5)
+    assert (knows(a, b), knows(b, a)) == (False, True)
+    writer.delete()
+    a.writer("Circle")
+    domain.run(2)
+    domain.network.heal()
+    domain.run(8)
+    assert reader.matched_count == 0
+    assert [data.topic_name for data in b.engine.known_writers.all()] == ["Circle"]
 
 
 # --- matching -------------------------------------------------------------------------------------------------------
