@@ -126,13 +126,8 @@ class FilteringWriter(StatefulWriter):
         proxy.lst_seq = max(wanted, default=proxy.history_sn)
 
     def _proxy_removed(self, proxy: ReaderProxy) -> None:
-        """What was for this reader alone goes with it."""
-        for destination in (proxy.guid, proxy.participant_guid):
-            for number in list(self._held.get(destination, ())):
-                change = self.cache.get(number)
-                if change is None or not self._readers_of(change):
-                    self._drop(number, destination)
-        for number in list(self._held.get(GUID_UNKNOWN, ())):
+        """What only this reader lacked is kept no longer."""
+        for number in self._numbers_of(proxy):
             self._release_number(number)
 
     def _free_acknowledged(self, proxy: ReaderProxy) -> None:

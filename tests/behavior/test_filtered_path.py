@@ -213,6 +213,28 @@ def test_what_was_for_a_reader_alone_goes_with_it() -> None:
     assert writer.next_deadline() == math.inf
 
 
+def test_what_only_a_reader_that_goes_lacked_goes_with_it() -> None:
+    """The other reader of its participant has acknowledged the change, and nobody else will."""
+    writer = make_writer()
+    one, other = match(writer, A), match(writer, reader_guid(2, key=9))
+    send(writer, A)
+    acknack(writer, one, 2, count=1)
+    writer.matched_reader_remove(other.guid, 0.0)
+    assert held(writer) == []
+
+
+def test_a_reader_that_comes_back_finds_its_part_of_the_history() -> None:
+    """As from any writer that keeps history: losing a reader says nothing about who comes later."""
+    history = RELIABLE_QOS | Qos(durability=TransientLocal())
+    writer = make_writer(history)
+    match(writer, A, history)
+    send(writer, A, B, A)
+    writer.matched_reader_remove(A, 0.0)
+    assert held(writer) == [1, 2, 3]
+    again = writer.matched_reader_add(reader_data(history, of=A), (LOCATOR,), 1.0)
+    assert shape(again) == ["HB 1-3 ? to 2"]
+
+
 def test_the_history_is_bounded_per_reader_and_blocks_nobody_else() -> None:
     writer = make_writer()
     match(writer, A)
