@@ -8,11 +8,12 @@ told in :mod:`ddsi.behavior.filtered`; this is its writer's side.  It differs fr
 - ``lst_seq`` says how far that reader was sent something, and every HEARTBEAT is directed and speaks of that alone.  It
   stops when the reader has acknowledged ``lst_seq``, whatever the others lack;
 - a change is kept until the readers it is for have it.  Who does not answer fills up his own share of the history,
-which is
-  bounded, and never the others' (:meth:`FilteringWriter.has_overflow`).
+  which is bounded, and never the others' (:meth:`FilteringWriter.has_overflow`).
 """
 
 from __future__ import annotations
+
+from itertools import takewhile
 
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.guid import GUID_UNKNOWN, Guid
@@ -35,7 +36,7 @@ class FilteringWriter(StatefulWriter):
         super().__init__(
             guid, qos, fragment_octets=fragment_octets, unacknowledged_octets_max=unacknowledged_octets_max
         )
-        # Which numbers of the cache are for whom, ascending.  A dict serves as an ordered set.
+        # The numbers in the cache by destination, ascending.  A dict serves as an ordered set.
         self._held: dict[Guid, dict[int, None]] = {}
 
     def lacks_room(self, octets: int, key: bytes) -> str | None:
@@ -94,8 +95,12 @@ class FilteringWriter(StatefulWriter):
     def directed_heartbeat(self, proxy: ReaderProxy, *, liveliness: bool = False) -> SendHeartbeat:
         """What is there for this reader, up to ``lst_seq``; ``first == last + 1`` when nothing is."""
         last = proxy.lst_seq
-        wanted = [number for number in self._numbers_of(proxy) if proxy.history_sn < number <= last]
-        first = min(wanted, default=last + 1)
+        # Of each destination the first will do: a long history must not cost time with every heartbeat.
+        oldest = (
+            next((number for number in numbers if number > proxy.history_sn), last + 1)
+            for numbers in self._numbers_for(proxy)
+        )
+        first = min([*oldest, last + 1])
         self._heartbeat_count += 1
         return SendHeartbeat(first, last, self._heartbeat_count, proxy.acked_sn >= last, (proxy,), liveliness)
 
@@ -122,57 +127,51 @@ class FilteringWriter(StatefulWriter):
 
     def _proxy_added(self, proxy: ReaderProxy) -> None:
         """A late joiner that is to have history: the highest number of it that is for this reader counts as sent."""
-        wanted = [number for number in self._numbers_of(proxy) if proxy.history_sn < number < self.next_unsent_sn]
-        proxy.lst_seq = max(wanted, default=proxy.history_sn)
+        proxy.lst_seq = max([proxy.history_sn, *(next(reversed(numbers)) for numbers in self._numbers_for(proxy))])
 
     def _proxy_removed(self, proxy: ReaderProxy) -> None:
         """What only this reader lacked is kept no longer."""
-        for number in self._numbers_of(proxy):
-            self._release_number(number)
+        self._release_up_to(self.cache.last_sn, proxy)
 
     def _free_acknowledged(self, proxy: ReaderProxy) -> None:
         """A change goes when the readers it is for have it; the others' acknowledgments mean nothing."""
-        for number in self._numbers_of(proxy):
-            if number <= proxy.acked_sn:
-                self._release_number(number)
+        self._release_up_to(proxy.acked_sn, proxy)
 
     def _advance_unsent(self) -> None:
-        change = self.cache.get(self.next_unsent_sn)
         self.next_unsent_sn += 1
-        if change is not None:
-            self._release(change)
+        self._release(self.next_unsent_sn - 1)
 
-    def _release_number(self, number: int) -> None:
+    def _expire(self, sequence_number: int) -> None:
+        change = self.cache.get(sequence_number)
+        if change is not None:
+            self._drop(change)
+
+    def _release_up_to(self, sequence_number: int, proxy: ReaderProxy) -> None:
+        """This reader needs none of its changes up to here (inclusive) any more."""
+        for numbers in self._numbers_for(proxy):
+            for number in list(takewhile(lambda number: number <= sequence_number, numbers)):
+                self._release(number)
+
+    def _release(self, number: int) -> None:
+        """Forget a change if all the readers that it is for have it, and no later one is to have it."""
         change = self.cache.get(number)
-        if change is not None:
-            self._release(change)
-
-    def _release(self, change: CacheChange) -> None:
-        number = change.sequence_number
-        if self.cache.keeps_acknowledged or number >= self.next_unsent_sn:
+        if change is None or self.cache.keeps_acknowledged or number >= self.next_unsent_sn:
             return
         if not any(proxy.is_reliable and proxy.acked_sn < number for proxy in self._readers_of(change)):
-            self._drop(number, change.destination)
+            self._drop(change)
 
-    def _drop(self, number: int, destination: Guid) -> None:
-        self.cache.remove(number)
-        numbers = self._held.get(destination)
-        if numbers is not None:
-            numbers.pop(number, None)
-            if not numbers:
-                del self._held[destination]
+    def _drop(self, change: CacheChange) -> None:
+        self.cache.remove(change.sequence_number)
+        numbers = self._held[change.destination]
+        del numbers[change.sequence_number]
+        if not numbers:
+            del self._held[change.destination]
 
     def _readers_of(self, change: CacheChange) -> list[ReaderProxy]:
         proxies = (*self.readers.values(), *self.local_readers.values())
         return [proxy for proxy in proxies if proxy.is_relevant(change)]
 
-    def _numbers_of(self, proxy: ReaderProxy) -> list[int]:
-        """The numbers in the cache that are relevant to this reader; forgets those that LIFESPAN took away."""
-        found: list[int] = []
-        for destination in (proxy.guid, proxy.participant_guid, GUID_UNKNOWN):
-            for number in list(self._held.get(destination, ())):
-                if self.cache.get(number) is not None:
-                    found.append(number)
-                else:
-                    self._drop(number, destination)
-        return found
+    def _numbers_for(self, proxy: ReaderProxy) -> list[dict[int, None]]:
+        """The numbers in the cache that are relevant to this reader, each destination's ascending."""
+        destinations = (proxy.guid, proxy.participant_guid, GUID_UNKNOWN)
+        return [self._held[destination] for destination in destinations if destination in self._held]

@@ -335,7 +335,7 @@ class StatefulWriter:
     def handle_timeout(self, now: float) -> list[WriterTransmission]:
         out: list[WriterTransmission] = []
         while self._expiries and self._expiries[0][0] <= now:
-            self.cache.remove(self._expiries.popleft()[1])
+            self._expire(self._expiries.popleft()[1])
         if self._pace_due <= now:
             self._pace_due = math.inf
             out.extend(self.unsent_changes(now))
@@ -349,6 +349,10 @@ class StatefulWriter:
             else:
                 self.heartbeat.stop()
         return out
+
+    def _expire(self, sequence_number: int) -> None:
+        """A change's LIFESPAN is over; it may be gone already."""
+        self.cache.remove(sequence_number)
 
     def _mark_stalled(self, lagging: list[ReaderProxy], now: float) -> bool:
         """Readers that have not answered for a while no longer hold the window; returns whether that freed it."""

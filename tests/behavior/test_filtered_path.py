@@ -21,7 +21,7 @@ from ddsi.messages.raw_submessage import SubmessageKind, iterate_submessages
 from ddsi.simulation import Domain, LinkConditions, NodeReader, NodeWriter, invariants
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import BestEffort, KeepAll, Reliable, TransientLocal
+from ddsi.structure.qos_policies import BestEffort, KeepAll, Lifespan, Reliable, TransientLocal
 from tests.behavior.builders import (
     LOCATOR,
     RELIABLE_QOS,
@@ -250,6 +250,19 @@ def test_the_history_is_bounded_per_reader_and_blocks_nobody_else() -> None:
     assert len(held(writer)) == MAX_CHANGES_PER_DESTINATION
     writer.matched_reader_remove(A, 0.0)
     assert not writer.has_overflow(A.participant)
+
+
+def test_what_has_expired_fills_up_nobodys_share() -> None:
+    writer = make_writer(RELIABLE_QOS | Qos(lifespan=Lifespan(1.0)))
+    a = match(writer, A)
+    send(writer, *[A] * MAX_CHANGES_PER_DESTINATION)
+    assert writer.has_overflow(A.participant)
+    writer.handle_timeout(1.0)
+    assert held(writer) == []
+    assert not writer.has_overflow(A.participant)
+    assert shape([writer.directed_heartbeat(a)]) == ["HB 257-256 ? to 2"], "it still has to hear that they are gone"
+    assert acknack(writer, a, 257, count=1) == []
+    assert writer.next_deadline() == math.inf
 
 
 def test_a_late_joiner_of_a_volatile_topic_gets_nothing_of_the_past() -> None:
