@@ -252,17 +252,25 @@ def test_the_history_is_bounded_per_reader_and_blocks_nobody_else() -> None:
     assert not writer.has_overflow(A.participant)
 
 
-def test_what_has_expired_fills_up_nobodys_share() -> None:
+def test_what_has_expired_is_announced_no_more() -> None:
     writer = make_writer(RELIABLE_QOS | Qos(lifespan=Lifespan(1.0)))
     a = match(writer, A)
-    send(writer, *[A] * MAX_CHANGES_PER_DESTINATION)
-    assert writer.has_overflow(A.participant)
+    send(writer, A, A)
+    assert shape(writer.handle_timeout(1.0)) == ["HB 3-2 ? to 2"], "it still has to hear that they are gone"
+    assert acknack(writer, a, 3, count=1) == []
+    assert writer.next_deadline() == math.inf
+
+
+def test_what_has_expired_fills_up_nobodys_share() -> None:
+    """Though nobody is there to hear of it."""
+    writer = make_writer(RELIABLE_QOS | Qos(lifespan=Lifespan(1.0), durability=TransientLocal()))
+    for destination in (A, GUID_UNKNOWN):
+        send(writer, *[destination] * MAX_CHANGES_PER_DESTINATION)
+        assert writer.has_overflow(destination.participant if destination == A else destination)
     writer.handle_timeout(1.0)
     assert held(writer) == []
     assert not writer.has_overflow(A.participant)
-    assert shape([writer.directed_heartbeat(a)]) == ["HB 257-256 ? to 2"], "it still has to hear that they are gone"
-    assert acknack(writer, a, 257, count=1) == []
-    assert writer.next_deadline() == math.inf
+    assert not writer.has_overflow(GUID_UNKNOWN)
 
 
 def test_a_late_joiner_of_a_volatile_topic_gets_nothing_of_the_past() -> None:
