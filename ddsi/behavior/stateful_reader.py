@@ -154,7 +154,8 @@ class StatefulReader:
     def _receive_best_effort(self, proxy: WriterProxy, change: CacheChange, now: float) -> int:
         """RTPS 2.5 §8.4.12.1: later numbers win, lower ones that come late are dropped.
 
-        The first number received is taken as it is: what came before it was not for us.
+        The first number received is taken as it is: what came before it was not for us.  Nor was what a filtering
+        writer skips.
         """
         number = change.sequence_number
         if number < proxy.next_sn and not self._begins_anew(proxy, number):
@@ -166,7 +167,7 @@ class StatefulReader:
         proxy.last_seq = number
         proxy.reorder.next_sn = number + 1
         self.history.add(change, now)
-        return 0 if is_first else lost
+        return 0 if is_first or proxy.uses_filter else lost
 
     def _begins_anew(self, proxy: WriterProxy, number: int) -> bool:
         """Many old numbers and not one that is new: the writer has restarted under the same GUID and counts from 1."""

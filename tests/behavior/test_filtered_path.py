@@ -428,6 +428,7 @@ def test_best_effort_readers_are_not_affected() -> None:
     crowd.domain.run(1)
     for index, reader in enumerate(crowd.readers):
         assert reader.session(crowd.writer.guid).numbers == list(range(index + 1, 10, 3))
+        assert reader.local.lost.total_count == 0, "numbers for others are no loss"
 
 
 def test_one_reader_that_is_silent_blocks_nobody() -> None:
