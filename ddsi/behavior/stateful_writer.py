@@ -432,6 +432,8 @@ class StatefulWriter:
         if not proxy.accepts_nack_frag(count, now):
             return []
         proxy.progress_time = now
+        if sequence_number > min(self.next_unsent_sn, self.cache.last_sn):
+            return []  # nothing of it was sent; a GAP would say that it never will be
         change = self.cache.get(sequence_number)
         if change is None or is_irrelevant(self.cache, proxy, sequence_number):
             return list(gap_for(self.cache, proxy, [sequence_number], self._gap_end(proxy)))

@@ -332,6 +332,15 @@ def test_fragments_that_were_not_sent_yet_are_not_repaired() -> None:
     )
 
 
+def test_a_change_of_which_nothing_was_sent_is_neither_repaired_nor_explained() -> None:
+    """A GAP for a number that is still to be written would make the reader skip it when it comes."""
+    writer = stateful_writer(fragment_octets=1000)
+    proxy = match(writer)
+    send(writer, bytes(1000 * writer.window.octets // 500), bytes(2000))
+    for number, count in ((2, 1), (3, 2)):
+        assert writer.receive_nack_frag(proxy, number, numbers(1, 1), count, 0.0) == []
+
+
 # --- what ACKNACKs mean ---------------------------------------------------------------------------------------------
 
 
