@@ -24,7 +24,7 @@ from ..messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
 from ..messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages, submessage_name
 from ..serialization.parameter_id import ParameterId
 from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
-from ..spi import NoKeys, NotForUs, Octets, Outcome, Rejected
+from ..spi import NoKeys, NotForUs, Octets, Outcome, Protection, Rejected
 from ..structure.builtin_entity_ids import SPDP_WRITER
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.errors import MalformedMessage, MalformedSample
@@ -49,6 +49,9 @@ _UNKNOWN_ID = bytes(4)
 _NUMBERS_END = 1 << 62
 _CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
 _UNKNOWN_PREFIX = bytes(12)
+_CLEAR = Protection.NONE
+# Inside a SEC_ envelope, by how the message around it arrived.
+_IN_ENVELOPE = (Protection.SUBMESSAGE, Protection.SUBMESSAGE | Protection.MESSAGE)
 
 
 class Incoming:
@@ -60,7 +63,7 @@ class Incoming:
         "now",
         "participant",
         "prefix",
-        "protected",
+        "protection",
         "source",
         "timestamp",
         "vendor_id",
@@ -77,7 +80,7 @@ class Incoming:
         self.timestamp: int | None = None
         self.destination = _UNKNOWN_PREFIX
         self.is_for_us = True
-        self.protected = False  # did this submessage come out of a SEC_ envelope?
+        self.protection = _CLEAR
 
 
 class Inbound:
@@ -142,9 +145,7 @@ class Inbound:
                 self._undecodable(incoming, decoded)
                 return
             view = memoryview(decoded)
-        elif not self._hooks.admits_clear_message(incoming.prefix):
-            self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
-            return
+            incoming.protection = Protection.MESSAGE
         self._submessages(incoming, view, 20)
 
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
@@ -191,15 +192,16 @@ class Inbound:
         """SEC_PREFIX to SEC_POSTFIX: whose it is, is told by INFO_DST before anything is decrypted."""
         if not incoming.is_for_us:
             return
+        outside = incoming.protection
+        if Protection.SUBMESSAGE in outside:
+            raise MalformedMessage("an envelope within an envelope", element="SEC_PREFIX")
         decoded = self._hooks.decode_submessage(octets, GuidPrefix(incoming.prefix))
         if isinstance(decoded, Outcome):
             self._undecodable(incoming, decoded)
             return
-        incoming.protected = True
-        try:
-            self._submessages(incoming, memoryview(decoded), 0)
-        finally:
-            incoming.protected = False
+        incoming.protection = _IN_ENVELOPE[outside]
+        self._submessages(incoming, memoryview(decoded), 0)
+        incoming.protection = outside
 
     def _undecodable(self, incoming: Incoming, outcome: Outcome) -> None:
         match outcome:
@@ -222,7 +224,13 @@ class Inbound:
 
     def _info_source(self, incoming: Incoming, raw: RawSubmessage) -> None:
         info = InfoSource.decode(raw.flags, raw.body)
-        incoming.prefix = bytes(info.guid_prefix)
+        prefix = bytes(info.guid_prefix)
+        if prefix != incoming.prefix:
+            # Protection proves who sent it.  Nobody may speak under its cover for somebody else.
+            if Protection.SUBMESSAGE in incoming.protection:
+                raise MalformedMessage("another source within an envelope", element="INFO_SRC", offset=raw.offset)
+            incoming.protection = _CLEAR
+        incoming.prefix = prefix
         incoming.vendor_id = info.vendor_id
         incoming.version = info.protocol_version
         incoming.timestamp = None
@@ -246,7 +254,7 @@ class Inbound:
         if remote is None:
             self._from_unmatched(incoming, writer_id, reader_id, number, view[payload_start:end])
             return
-        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+        if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
         payload = self._hooks.decode_payload(remote.guid, view[payload_start:end])
@@ -276,7 +284,7 @@ class Inbound:
                 incoming, data.writer_id, data.reader_id, data.writer_sn, data.serialized_payload, inline
             )
             return
-        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+        if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
         payload: Octets | Outcome = data.serialized_payload
@@ -364,9 +372,15 @@ class Inbound:
     ) -> None:
         """DATA of a writer that no reader here is matched with.  SPDP is the one that is expected."""
         if writer_id == SPDP_WRITER:
+            guid = Guid(incoming.prefix + writer_id)
+            if incoming.participant is not None and not self._hooks.admits(guid, incoming.protection):
+                # It is alive (see `_identify`), and that is all that we believe.
+                if inline is not None and inline.status:
+                    self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source, f"goodbye of {guid.participant}")
+                return
             change = CacheChange(
                 ChangeKind((inline.status & 3) if inline is not None else 0),
-                Guid(incoming.prefix + writer_id),
+                guid,
                 number,
                 bytes(payload),
                 key_hash=inline.key_hash if inline is not None else b"",
@@ -386,7 +400,7 @@ class Inbound:
         if remote is None:
             self._engine.dropped(DropReason.UNMATCHED, incoming.source)
             return
-        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+        if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
         if data.sample_size > self._engine.config.max_sample_size:
@@ -447,7 +461,7 @@ class Inbound:
         if remote is None:
             self._engine.dropped(DropReason.UNMATCHED, incoming.source)
             return []
-        if not incoming.protected and not self._hooks.admits_clear_submessage(remote.guid):
+        if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return []
         return [
@@ -460,7 +474,8 @@ class Inbound:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
         _check_number(heartbeat.last_sn, raw)
         restarted = False
-        for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
+        pairs = self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id)
+        for local, proxy in pairs:
             due = proxy.schedule.due
             lost = local.behavior.receive_heartbeat(
                 proxy, heartbeat.first_sn, heartbeat.last_sn, heartbeat.count, incoming.now, final=heartbeat.final
@@ -471,9 +486,10 @@ class Inbound:
                 self._engine.proxy_touched(local.behavior, proxy)
             restarted = restarted or proxy.contradictions >= _CONTRADICTIONS_OF_A_RESTART
         self._forget_settled(incoming, heartbeat.writer_id)
-        if restarted:
+        # A participant that may not say in clear that it changed may not seem in clear to have begun anew.
+        if restarted and self._hooks.admits(incoming.prefix + SPDP_WRITER, incoming.protection):
             self._engine.discovery.participant_restarted(incoming)
-        if heartbeat.liveliness and incoming.is_for_us:
+        if heartbeat.liveliness and pairs:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
 
     def _heartbeat_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
@@ -511,7 +527,7 @@ class Inbound:
         if writer is None or proxy is None:
             self._engine.dropped(DropReason.UNKNOWN_READER, incoming.source)
             return
-        if not incoming.protected and not self._hooks.admits_clear_submessage(reader_guid):
+        if not self._hooks.admits(reader_guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
         acked_sn = proxy.acked_sn
@@ -533,7 +549,7 @@ class Inbound:
         if writer is None or proxy is None:
             self._engine.dropped(DropReason.UNKNOWN_READER, incoming.source)
             return
-        if not incoming.protected and not self._hooks.admits_clear_submessage(reader_guid):
+        if not self._hooks.admits(reader_guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
         answers = writer.behavior.receive_nack_frag(

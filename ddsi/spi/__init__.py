@@ -9,6 +9,7 @@ from .hooks import (
     Octets,
     Parts,
     ProtectedEndpoint,
+    Revoked,
     SecurityHooks,
     SendMessage,
 )
@@ -23,6 +24,7 @@ from .outcomes import (
     NotForUs,
     Outcome,
     Overhead,
+    Protection,
     Refused,
     Rejected,
 )
@@ -50,8 +52,10 @@ __all__ = [
     "Parts",
     "Plaintext",
     "ProtectedEndpoint",
+    "Protection",
     "Refused",
     "Rejected",
+    "Revoked",
     "SecurityHooks",
     "SendMessage",
     "load_hooks",

@@ -24,7 +24,7 @@ from ..structure.discovered import (
 )
 from ..structure.guid import EntityId, Guid, GuidPrefix
 from ..structure.qos_policies import Properties
-from .outcomes import Admission, Outcome, Overhead
+from .outcomes import Admission, Outcome, Overhead, Protection
 
 __all__ = [
     "Announcement",
@@ -35,6 +35,7 @@ __all__ = [
     "Octets",
     "Parts",
     "ProtectedEndpoint",
+    "Revoked",
     "SecurityHooks",
     "SendMessage",
 ]
@@ -56,19 +57,31 @@ class LocalParticipant:
 
 @dataclass(frozen=True, slots=True)
 class Announcement:
-    """What security adds to the SPDP announcement: parameters (tokens, attributes) and builtin endpoints."""
+    """What security adds to the SPDP announcement: parameters (tokens, attributes) and builtin endpoints.
+
+    The participant has exactly the secure builtin endpoints that ``builtin_endpoints`` names.  On the secure SPDP topic
+    ``protected_parameters`` follow ``parameters`` (DDS-Security 1.1 §7.4.1.6: the identity status token).
+    """
 
     parameters: tuple[Parameter, ...] = ()
     builtin_endpoints: BuiltinEndpoints = BuiltinEndpoints(0)
+    protected_parameters: tuple[Parameter, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ProtectedEndpoint:
-    """What security adds to a local endpoint: SEDP parameters, and which SEDP announces it (the secure one?)."""
+    """What security adds to a local endpoint: SEDP parameters, and which builtin topics speak of it (§7.4.8).
+
+    ``discovery_protected``: the secure SEDP topic announces it, and the plain one does not.
+    ``liveliness_protected``: its liveliness is asserted on the secure ParticipantMessage topic.
+    ``key_protected``: key hashes do not show the key: they are always a digest, and go with every sample, as nobody
+    can compute them before decrypting.
+    """
 
     parameters: tuple[Parameter, ...] = ()
     discovery_protected: bool = False
     liveliness_protected: bool = False
+    key_protected: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +113,14 @@ class Decided:
     admission: Admission
 
 
-HookEffect = SendMessage | Compute | Decided
+@dataclass(frozen=True, slots=True)
+class Revoked:
+    """Effect: our own identity or permissions have ended.  The participant says why, and closes (§8.3.2.11.7)."""
+
+    reason: str
+
+
+HookEffect = SendMessage | Compute | Decided | Revoked
 
 
 class SecurityHooks(Protocol):
@@ -117,6 +137,13 @@ class SecurityHooks(Protocol):
 
     def announcement(self) -> Announcement:
         """What to add to SPDP; asked whenever the announcement is made anew (§7.4.1.4)."""
+        ...
+
+    def announced(self, parameters: bytes) -> None:
+        """What SPDP says of us: a big-endian parameter list with its sentinel and without encapsulation header.
+
+        Called after :meth:`announcement`, and whenever it changes; it is the handshake's c.pdata (§9.3.2.5.1).
+        """
         ...
 
     def local_writer(self, data: DiscoveredWriterData) -> ProtectedEndpoint:
@@ -137,7 +164,8 @@ class SecurityHooks(Protocol):
         """A participant was discovered (§8.3.2.11.3, validate_remote_identity).
 
         PENDING while it is authenticated: its endpoints are not matched, and only the builtin endpoints that
-        authentication itself needs are, until a :class:`Decided` comes.
+        authentication itself needs (ParticipantStatelessMessage) are, until a :class:`Decided` comes, whose ``local``
+        is our participant.  Who is refused once is asked about again when it announces something new.
         """
         ...
 
@@ -145,8 +173,16 @@ class SecurityHooks(Protocol):
 
     def remote_participant_lost(self, guid: Guid) -> None: ...
 
+    def admits_announcement(self, data: DiscoveredWriterData | DiscoveredReaderData, *, is_secure: bool) -> bool:
+        """A remote endpoint was announced on the secure SEDP topic, or on the plain one: is that where it belongs?"""
+        ...
+
     def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
-        """May the local endpoint match the remote one (§8.4.2.9.10-11, §8.5.1.7.3-6)?  PENDING: keys are under way."""
+        """May the local endpoint match the remote one (§8.4.2.9.10-11, §8.5.1.7.3-6)?  PENDING: keys are under way.
+
+        Asked for pairs of builtin endpoints too, but SPDP's.  Before a participant is admitted only its
+        ParticipantStatelessMessage endpoints are asked about.
+        """
         ...
 
     def unmatch(self, local: Guid, remote: Guid) -> None: ...
@@ -178,13 +214,17 @@ class SecurityHooks(Protocol):
         ...
 
     def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
-        """Protect one submessage of a writer or reader; returns the octets to send in its place (§8.5.1.9.2-3)."""
+        """Protect one submessage of a writer or reader; returns the octets to send in its place (§8.5.1.9.2-3).
+
+        Nothing at all, ``()``, when it must not leave: there is no key for anybody.
+        """
         ...
 
     def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
         """Protect a whole RTPS message, given and returned with its header (§8.5.1.9.4).
 
-        ``receivers`` are endpoints or participants; their participants are meant."""
+        ``receivers`` are endpoints or participants; their participants are meant.  ``()``: nothing is to be sent.
+        """
         ...
 
     # --- transform, inwards ------------------------------------------------------------------------------
@@ -201,10 +241,19 @@ class SecurityHooks(Protocol):
         """Undo :meth:`encode_payload` (§8.5.1.9.9)."""
         ...
 
-    def admits_clear_message(self, source: bytes) -> bool:
-        """May a message of this participant (12 octets) come without message protection?"""
+    def protects_payload(self, writer: Guid) -> bool:
+        """Are this remote writer's payloads protected?
+
+        Then a DATA_FRAG may hold a run of plain fragments of a sample that was protected as a whole (OpenDDS does so;
+        §8.5.1.9.1 leaves the order open), and its payload may be called non-standard.
+        """
         ...
 
-    def admits_clear_submessage(self, sender: bytes) -> bool:
-        """May a submessage of this endpoint (16 octets) come without submessage protection?"""
+    def admits(self, sender: bytes, protection: Protection) -> bool:
+        """May a submessage of this remote writer or reader (the 16 octets of its Guid) be acted upon, having come so?
+
+        Asked for every submessage of an endpoint that is matched; and for SPDP in clear of a participant that is known,
+        whose announcement or goodbye is not heeded when this is False: an authenticated participant speaks of itself
+        on the secure topic only (§7.4.1.6).  On the path of every sample: it must be quick.
+        """
         ...

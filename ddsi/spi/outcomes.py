@@ -7,7 +7,7 @@ protected for somebody else is no error at all; so each case has a name and drop
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntFlag
 
 __all__ = [
     "ADMITTED",
@@ -19,9 +19,18 @@ __all__ = [
     "NotForUs",
     "Outcome",
     "Overhead",
+    "Protection",
     "Refused",
     "Rejected",
 ]
+
+
+class Protection(IntFlag):
+    """How a submessage arrived: inside a protected message, inside a SEC_ envelope of its own, both, or in clear."""
+
+    NONE = 0
+    MESSAGE = 1
+    SUBMESSAGE = 2
 
 
 class _Verdict(Enum):

@@ -12,7 +12,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid, GuidPrefix
 from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, Parts, ProtectedEndpoint
-from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
+from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead, Protection
 
 __all__ = ["PLAINTEXT", "Plaintext"]
 
@@ -30,6 +30,9 @@ class Plaintext:
 
     def announcement(self) -> Announcement:
         return _NO_ANNOUNCEMENT
+
+    def announced(self, parameters: bytes) -> None:
+        """Nobody is told by other means."""
 
     def local_writer(self, data: DiscoveredWriterData) -> ProtectedEndpoint:
         return _UNPROTECTED
@@ -51,6 +54,9 @@ class Plaintext:
 
     def remote_participant_lost(self, guid: Guid) -> None:
         """Nothing was kept."""
+
+    def admits_announcement(self, data: DiscoveredWriterData | DiscoveredReaderData, *, is_secure: bool) -> bool:
+        return True
 
     def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
         return ADMITTED
@@ -94,10 +100,10 @@ class Plaintext:
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
         return payload
 
-    def admits_clear_message(self, source: bytes) -> bool:
-        return True
+    def protects_payload(self, writer: Guid) -> bool:
+        return False
 
-    def admits_clear_submessage(self, sender: bytes) -> bool:
+    def admits(self, sender: bytes, protection: Protection) -> bool:
         return True
 
 

@@ -23,6 +23,7 @@ from ddsi.spi import (
     Outcome,
     Overhead,
     Parts,
+    Protection,
     Refused,
     Rejected,
     SendMessage,
@@ -239,8 +240,8 @@ class Masking(Hooks):
     def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
         return Overhead(submessage=20)
 
-    def admits_clear_submessage(self, sender: bytes) -> bool:
-        return Guid(sender).entity_id.is_builtin
+    def admits(self, sender: bytes, protection: Protection) -> bool:
+        return Protection.SUBMESSAGE in protection or Guid(sender).entity_id.is_builtin
 
 
 def _inverted(octets: Octets) -> bytes:

@@ -14,6 +14,7 @@ from ddsi.messages.heartbeat import Heartbeat
 from ddsi.messages.interpreter import InfoDestination
 from ddsi.serialization.parameter_id import ParameterId
 from ddsi.serialization.parameter_list import ParameterList
+from ddsi.spi import PLAINTEXT, SecurityHooks
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import EntityId, EntityKind, Guid, GuidPrefix
@@ -27,7 +28,7 @@ OUR_USER_ADDRESS = Locator.udp_v4("10.0.0.1", 7411)
 GROUP = Locator.udp_v4("239.255.0.1", 7400)
 
 
-def engine(*, multicast: bool = True, config: Config | None = None) -> Participant:
+def engine(*, multicast: bool = True, config: Config | None = None, hooks: SecurityHooks = PLAINTEXT) -> Participant:
     """A participant that was just started, its first announcement drained."""
     participant = Participant(
         ParticipantSetup(
@@ -41,6 +42,7 @@ def engine(*, multicast: bool = True, config: Config | None = None) -> Participa
         ),
         random=Random(1),
         wall_clock=lambda: 1_700_000_000 * 10**9,
+        hooks=hooks,
     )
     participant.start(0.0)
     participant.handle_timeout(0.0)

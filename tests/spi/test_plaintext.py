@@ -5,7 +5,18 @@ from __future__ import annotations
 import inspect
 import math
 
-from ddsi.spi import ADMITTED, NO_OVERHEAD, NOT_FOR_US, PLAINTEXT, LocalParticipant, SecurityHooks
+from ddsi.spi import (
+    ADMITTED,
+    NO_OVERHEAD,
+    NOT_FOR_US,
+    PLAINTEXT,
+    Announcement,
+    LocalParticipant,
+    ProtectedEndpoint,
+    Protection,
+    SecurityHooks,
+)
+from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
 from ddsi.structure.qos import EndpointQos
@@ -33,17 +44,19 @@ def test_everybody_is_admitted_as_he_is() -> None:
     assert PLAINTEXT.remote_participant(DiscoveredParticipantData(guid=GUID), 0.0) is ADMITTED
     assert PLAINTEXT.remote_participant_changed(DiscoveredParticipantData(guid=GUID), 0.0) is ADMITTED
     assert PLAINTEXT.match(GUID, READER) is ADMITTED
-    assert PLAINTEXT.admits_clear_message(PREFIX)
-    assert PLAINTEXT.admits_clear_submessage(GUID)
+    assert PLAINTEXT.admits_announcement(READER, is_secure=False)
+    assert all(PLAINTEXT.admits(GUID, protection) for protection in Protection)
+    assert PLAINTEXT.admits(GUID, Protection.NONE)
 
 
 def test_nothing_is_announced_and_no_endpoint_protected() -> None:
     announcement = PLAINTEXT.announcement()
-    assert (announcement.parameters, int(announcement.builtin_endpoints)) == ((), 0)
+    assert announcement == Announcement((), BuiltinEndpoints(0), ())
     for protection in (PLAINTEXT.local_reader(READER), PLAINTEXT.local_endpoint_changed(READER)):
-        assert (protection.parameters, protection.discovery_protected, protection.liveliness_protected) == (
-            (), False, False,
-        )  # fmt: skip
+        assert protection == ProtectedEndpoint(
+            (), discovery_protected=False, liveliness_protected=False, key_protected=False
+        )
+    assert not PLAINTEXT.protects_payload(GUID)
 
 
 def test_octets_pass_as_they_are_and_are_not_copied() -> None:
