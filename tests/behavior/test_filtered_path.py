@@ -391,6 +391,30 @@ def test_a_peer_that_omits_the_gap_converges_by_acknack(seed: int, monkeypatch: 
         assert reader.session(crowd.writer.guid).numbers == list(range(index + 1, 41, 4))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_peer_whose_heartbeats_speak_of_all_numbers_converges_too(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So does Cyclone DDS: its GAPs come in answer to an ACKNACK only, for whatever the HEARTBEAT made us ask."""
+
+    def undirected(writer: FilteringWriter, proxy: ReaderProxy, *, liveliness: bool = False) -> SendHeartbeat:
+        writer._heartbeat_count += 1
+        first, last = writer.cache.first_sn, writer.cache.last_sn
+        return SendHeartbeat(first, last, writer._heartbeat_count, proxy.acked_sn >= proxy.lst_seq, (proxy,))
+
+    monkeypatch.setattr(filtering_writer, "gap_before", lambda reader, change: None)
+    monkeypatch.setattr(FilteringWriter, "directed_heartbeat", undirected)
+    crowd = Crowd(seed, 4, WEATHER if seed else LinkConditions())
+    for step in range(300):
+        crowd.write_to(crowd.readers[step % 4 if step % 100 < 80 else 0])
+    crowd.settle()
+    for index, reader in enumerate(crowd.readers):
+        expected = [step + 1 for step in range(300) if (step % 4 if step % 100 < 80 else 0) == index]
+        assert reader.session(crowd.writer.guid).numbers == expected
+        assert reader.local.lost.total_count == 0
+    assert invariants.quiet(crowd.domain, 20) == []
+
+
 def test_without_loss_the_gap_makes_asking_needless() -> None:
     """The numbers between are explained in the datagram of the sample, so no ACKNACK asks for anything."""
     crowd = Crowd(1, 3, LinkConditions())
