@@ -6,32 +6,21 @@ DDS-Security 1.1 §8.6, §8.7; conventions: :mod:`ddsi_security.plugins`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Protocol
 
+from ddsi.structure.guid import Guid
 from ddsi.structure.qos_policies import Properties
 
 from .attributes import DataTags
+from .builtin_logging_type import BuiltinLoggingTypeV2, LogLevel
 
-__all__ = ["DataTagging", "LogLevel", "LogOptions", "Logging", "LoggingListener"]
-
-
-class LogLevel(IntEnum):
-    """LoggingLevel (§8.6.2), the severities of syslog (RFC 5424 §6.2.1): less is worse."""
-
-    EMERGENCY_LEVEL = 0
-    ALERT_LEVEL = 1
-    CRITICAL_LEVEL = 2
-    ERROR_LEVEL = 3
-    WARNING_LEVEL = 4
-    NOTICE_LEVEL = 5
-    INFO_LEVEL = 6
-    DEBUG_LEVEL = 7
+__all__ = ["BuiltinLoggingTypeV2", "DataTagging", "LogLevel", "LogOptions", "Logging", "LoggingListener"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogOptions:
-    """LogOptions (§8.6.2).  ``distribute``: publish on the topic DDS:Security:LogTopic as well."""
+    """LogOptions (§8.6.2).  ``logging_level``: what is less severe is not logged; ``log_file``: a path, "" for none;
+    ``distribute``: publish on the topic DDS:Security:LogTopicV2 as well, by way of the listener."""
 
     logging_level: LogLevel = LogLevel.ERROR_LEVEL
     log_file: str = ""
@@ -39,28 +28,56 @@ class LogOptions:
 
 
 class LoggingListener(Protocol):
-    """Hears each event that is logged, say to publish it (§8.6.2)."""
+    """Hears each event that is to be distributed, and publishes it (§8.6.2).  Implemented by the service."""
 
-    def on_log_message(self, level: LogLevel, message: str, category: str) -> None: ...
+    def on_log_message(self, event: BuiltinLoggingTypeV2) -> None:
+        """Called within :meth:`Logging.log`; the event is not changed afterwards."""
+        ...
 
 
 class Logging(Protocol):
-    """Keeps what a security officer must know.  §8.6.2; called by the other plugins and the service."""
+    """Keeps what a security officer must know.  §8.6.2; called by the service, one object per participant."""
 
     def set_log_options(self, options: LogOptions) -> None:
-        """Before enable_logging; afterwards it raises ConfigurationError."""
+        """Instead of those from the properties.  Only before enable_logging; afterwards ConfigurationError."""
+        ...
+
+    def get_log_options(self) -> LogOptions:
+        """The options in force; the service has a writer only if they say ``distribute``.  Not the OMG's."""
         ...
 
     def enable_logging(self) -> None:
-        """Nothing is logged before, and the options are fixed from now on.  Raises ConfigurationError."""
+        """Nothing is logged before, and the options are fixed from now on.
+
+        Raises ConfigurationError for a file that cannot be written.
+        """
         ...
 
-    def log(self, level: LogLevel, message: str, category: str) -> None:
-        """Never raises: a full disk must not stop a participant.  ``message`` holds no secret."""
+    def set_participant(self, participant_guid: Guid, domain_id: int) -> None:
+        """Whose events these are, once that is decided: events before go without.  Not the OMG's."""
+        ...
+
+    def log(
+        self,
+        level: LogLevel,
+        message: str,
+        category: str,
+        *,
+        plugin_class: str = "",
+        plugin_method: str = "",
+        entity: Guid | None = None,
+    ) -> None:
+        """Never raises: a full disk must not stop a participant.
+
+        ``message`` holds no secret; what of it came from the network need not be made safe before.  ``category`` is a
+        word for the kind of event (``msgid``).  The other three are not the OMG's parameters but fields of its type:
+        the plugin's class id (``DDS:Auth:PKI-DH``), its operation, and the Guid of the entity concerned where it is not
+        the participant itself.
+        """
         ...
 
     def set_listener(self, listener: LoggingListener | None) -> None:
-        """At most one; None for none."""
+        """At most one; None for none.  It hears nothing unless the options say ``distribute``."""
         ...
 
 

@@ -37,11 +37,13 @@ OPERATIONS = {
     "DataTagging": "",
     "AuthenticationListener": "on_revoke_identity on_status_changed",
     "AccessControlListener": "on_revoke_permissions",
+    "LoggingListener": "on_log_message",
 }
 OURS = {
     "Authentication": {"get_subject_name", "next_deadline", "handle_timeout"},
     "AccessControl": {"next_deadline", "handle_timeout", "return_permissions_handle"},
     "CryptoTransform": {"overhead"},
+    "Logging": {"get_log_options", "set_participant"},
     "DataTagging": {"get_data_tags"},
 }
 NUMBERED = ("Authentication", "AccessControl", "CryptoKeyFactory", "CryptoKeyExchange", "CryptoTransform")
