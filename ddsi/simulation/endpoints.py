@@ -153,6 +153,12 @@ class NodeReader:
             self.node.pump()
         return taken
 
+    def hurry(self) -> None:
+        """From here on take whatever is there at once."""
+        self.takes = True
+        while self.take():
+            pass
+
     def delete(self) -> None:
         self.is_deleted = True
         self.node.engine.delete_reader(self.local, self.node.now)

@@ -12,7 +12,7 @@ from ddsi.simulation.run import run_seed, run_seeds
 from ddsi.simulation.scenario import Create, Failure, Restart, Scenario, Wait
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import KeepAll, Reliable, TransientLocal
+from ddsi.structure.qos_policies import KeepAll, Reliable, ResourceLimits, TransientLocal
 
 RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
 
@@ -61,6 +61,10 @@ def _invented(writer: NodeWriter, reader: NodeReader) -> None:
     reader.session(writer.guid).changes.append(invented)
 
 
+def _of_another(writer: NodeWriter, reader: NodeReader) -> None:
+    writer.written[3].destination = writer.guid.participant
+
+
 def _not_taken(writer: NodeWriter, reader: NodeReader) -> None:
     reader.taken.pop()
 
@@ -73,6 +77,7 @@ def _not_taken(writer: NodeWriter, reader: NodeReader) -> None:
         (_altered, "3 is not as it was written"),
         (_truncated, "3 is not as it was written"),
         (_invented, "99 was never written"),
+        (_of_another, "3 was for another"),
         (_not_taken, "3 samples taken of 4 received"),
     ],
 )
@@ -95,6 +100,35 @@ def test_history_from_before_the_match_is_found() -> None:
     proxy.history_sn = 2
     (found,) = invariants.complete(domain)
     assert "1, 2 came, which were written before the match" in found
+
+
+def test_what_a_reader_without_room_rejected_need_not_be_taken() -> None:
+    """Best effort has no way to make the writer wait."""
+    domain = Domain(seed=1)
+    writer = domain.node().writer("Square", Qos(history=KeepAll()))
+    few = Qos(history=KeepAll(), resource_limits=ResourceLimits(max_samples=2))
+    reader = domain.node().reader("Square", few, takes=False)
+    assert domain.run_until(domain.all_matched, 1)
+    for _ in range(5):
+        writer.write()
+    domain.run(1)
+    reader.hurry()
+    assert (len(reader.taken), reader.local.rejected.total_count) == (2, 3)
+    assert invariants.in_order(domain) == []
+    reader.taken.pop()
+    assert any("1 samples taken of 5 received" in flaw for flaw in invariants.in_order(domain))
+
+
+def test_only_a_reliable_pair_is_owed_the_rest_of_a_sample() -> None:
+    for qos, owes in ((RELIABLE, True), (Qos(history=KeepAll()), False)):
+        domain = Domain(seed=1)
+        writer, reader = domain.node().writer("Square", qos), domain.node().reader("Square", qos)
+        assert domain.run_until(domain.all_matched, 1)
+        # Only the last fragment is small enough to get through.
+        domain.network.set_link(writer.node.host, reader.node.host, LinkConditions(mtu=600))
+        writer.write(3000)
+        domain.run(0.1)
+        assert any("unfinished samples" in flaw for flaw in invariants.memory_released(domain)) is owes
 
 
 def test_a_match_that_should_not_be_and_one_that_is_missing_are_found() -> None:
