@@ -6,17 +6,20 @@ so a failing seed tells what it did.  Its sizes are those of tests: a second sce
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from ..behavior.filtering_writer import FilteringWriter
 from ..config import Config
 from ..structure.cache_change import ChangeKind
+from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.qos import Qos
 from ..structure.qos_policies import (
     BestEffort,
     History,
     KeepAll,
     KeepLast,
+    Lifespan,
     Partition,
     Reliable,
     ResourceLimits,
@@ -33,6 +36,7 @@ from .node import Node
 
 __all__ = ["Failure", "Report", "Scenario"]
 
+_FILTERED = 3  # the topic whose writers filter
 _INTRODUCTION_S = 15.0
 _REST_S = 120.0
 _QUIET_S = 30.0
@@ -50,17 +54,28 @@ class Failure(AssertionError):
 
 @dataclass(frozen=True, slots=True)
 class EndpointPlan:
-    """An endpoint that a scenario creates: writer or reader, on which topic, with which QoS."""
+    """An endpoint that a scenario creates: writer or reader, on which topic, with which QoS.
+
+    ``is_filtered``: the writers of this topic send each reader its own changes only.  ``takes``: a reader whose
+    application takes samples as they come; else only now and then.
+    """
 
     node: int
     is_writer: bool
     topic: str
     is_keyed: bool
     qos: Qos
+    is_filtered: bool = False
+    takes: bool = True
 
     def __str__(self) -> str:
-        kind = "writer" if self.is_writer else "reader"
-        return f"node {self.node}: {'keyed ' if self.is_keyed else ''}{kind} of {self.topic}, {self.qos}"
+        words = [
+            "filtering" if self.is_filtered and self.is_writer else "",
+            "" if self.takes else "slow",
+            "keyed" if self.is_keyed else "",
+            "writer" if self.is_writer else "reader",
+        ]
+        return f"node {self.node}: {' '.join(filter(None, words))} of {self.topic}, {self.qos}"
 
 
 # --- steps: each is a value, and does one thing to a run -----------------------------------------------------------
@@ -107,6 +122,16 @@ class End:
 
 
 @dataclass(frozen=True, slots=True)
+class Take:
+    """The application of a slow reader takes what is there."""
+
+    choice: int
+
+    def __str__(self) -> str:
+        return f"a slow reader (by {self.choice}) takes"
+
+
+@dataclass(frozen=True, slots=True)
 class Delete:
     """Delete an endpoint, a writer or a reader."""
 
@@ -139,7 +164,7 @@ class Cut:
         return f"the network is cut between {', '.join(numbers)} and the others for {self.seconds} s"
 
 
-Step = Wait | Create | Write | End | Delete | Restart | Cut
+Step = Wait | Create | Write | End | Take | Delete | Restart | Cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +226,7 @@ class _Planner:
     def __init__(self, seed: int) -> None:
         self._seed = seed
         self._dice = Dice(seed)
-        self._topics = [("Square", False), ("Circle", True), ("Triangle", self._dice.chance(0.5))]
+        self._topics = [("Square", False), ("Circle", True), ("Triangle", self._dice.chance(0.5)), ("keys", False)]
 
     def plan(self) -> Scenario:
         dice = self._dice
@@ -220,8 +245,9 @@ class _Planner:
         )
         steps = scenario.steps
         # Every scenario has at least one reliable pair on different nodes, or it would say little.
-        steps.append(Create(self._endpoint(0, is_writer=True, topic=0, reliable=True)))
-        steps.append(Create(self._endpoint(1, is_writer=False, topic=0, reliable=True)))
+        topic = _FILTERED if dice.chance(0.2) else 0
+        steps.append(Create(self._endpoint(0, is_writer=True, topic=topic, reliable=True)))
+        steps.append(Create(self._endpoint(1, is_writer=False, topic=topic, reliable=True)))
         for _ in range(dice.below(4)):
             steps.append(self._creation(node_count))
         steps.append(Wait(dice.pick((0.0, 0.01, 1.0))))
@@ -250,7 +276,7 @@ class _Planner:
             self._endpoint(
                 dice.below(node_count),
                 is_writer=dice.chance(0.4),
-                topic=dice.pick((0, 0, 1, 2)),
+                topic=dice.pick((0, 0, 1, 1, 2, 2, _FILTERED, _FILTERED)),
                 reliable=dice.chance(0.7),
             )
         )
@@ -258,8 +284,9 @@ class _Planner:
     def _endpoint(self, node: int, *, is_writer: bool, topic: int, reliable: bool) -> EndpointPlan:
         dice = self._dice
         name, is_keyed = self._topics[topic]
+        is_filtered = topic == _FILTERED
         histories: tuple[History, ...] = (KeepAll(), KeepAll(), KeepLast(1), KeepLast(5))
-        history = dice.pick(histories)
+        history = KeepAll() if is_filtered and is_writer else dice.pick(histories)
         limits = ResourceLimits()
         if isinstance(history, KeepAll) and dice.chance(0.2):
             limits = ResourceLimits(max_samples=20)
@@ -269,8 +296,10 @@ class _Planner:
             history=history,
             resource_limits=limits,
             partition=Partition(dice.pick(("p", "q", "p*"))) if dice.chance(0.1) else None,
+            lifespan=Lifespan(dice.pick((0.02, 0.5))) if is_writer and dice.chance(0.05) else None,
         )
-        return EndpointPlan(node, is_writer, name, is_keyed, qos)
+        takes = is_writer or not dice.chance(0.15)
+        return EndpointPlan(node, is_writer, name, is_keyed, qos, is_filtered, takes)
 
     def _step(self, node_count: int) -> Step:
         dice = self._dice
@@ -286,6 +315,8 @@ class _Planner:
             return End(dice.below(1 << 16), dice.pick(kinds), dice.below(4))
         if drawn < 70:
             return Wait(dice.pick((0.0005, 0.003, 0.05, 0.3, 2.0)))
+        if drawn < 73:
+            return Take(dice.below(1 << 16))
         if drawn < 80:
             return self._creation(node_count)
         if drawn < 86:
@@ -340,6 +371,8 @@ class _Run:
         self._check("some seconds after the network healed", invariants.matched(domain))
         for writer in domain.writers():
             writer.write()
+        for reader in domain.readers():
+            reader.hurry()
         # It takes a moment until those who lack something know it.
         domain.run(1.0)
         if not domain.run_until(self._is_at_rest, _REST_S):
@@ -395,6 +428,10 @@ class _Run:
                 keyed = [writer for writer in domain.writers() if writer.is_keyed]
                 if keyed:
                     keyed[choice % len(keyed)].end(kind, key)
+            case Take(choice):
+                slow = [reader for reader in domain.readers() if not reader.takes]
+                if slow:
+                    slow[choice % len(slow)].take()
             case Delete(choice):
                 self._delete(choice)
             case Restart(number, goodbye):
@@ -409,8 +446,10 @@ class _Run:
 
     def _create(self, plan: EndpointPlan) -> None:
         node: Node = self._domain.nodes[plan.node]
-        make: Callable[..., object] = node.writer if plan.is_writer else node.reader
-        make(plan.topic, plan.qos, keyed=plan.is_keyed)
+        if plan.is_writer:
+            node.writer(plan.topic, plan.qos, keyed=plan.is_keyed, filters=plan.is_filtered)
+        else:
+            node.reader(plan.topic, plan.qos, keyed=plan.is_keyed, takes=plan.takes, uses_filter=plan.is_filtered)
 
     def _write(self, choice: int, count: int, size: int) -> None:
         writers = self._domain.writers()
@@ -418,9 +457,17 @@ class _Run:
             return
         writer = writers[choice % len(writers)]
         for _ in range(count):
-            writer.write(self._dice.below(size + 1), self._dice.below(4))
+            writer.write(self._dice.below(size + 1), self._dice.below(4), destination=self._destination(writer))
             if self._dice.chance(0.2):
                 self._domain.run(0.0005)
+
+    def _destination(self, writer: NodeWriter) -> Guid:
+        """Of a filtering writer: everybody, or one of the readers that there ever were, or the participant of one."""
+        readers = [reader for node in self._domain.nodes for reader in node.readers if reader.topic == writer.topic]
+        if not isinstance(writer.local.behavior, FilteringWriter) or not readers:
+            return GUID_UNKNOWN
+        reader = self._dice.pick(readers).guid
+        return self._dice.pick((reader, reader.participant, GUID_UNKNOWN))
 
     def _delete(self, choice: int) -> None:
         endpoints: list[NodeWriter | NodeReader] = [*self._domain.writers(), *self._domain.readers()]

@@ -9,12 +9,13 @@ import sys
 from pathlib import Path
 
 from ddsi.simulation import Dice
-from ddsi.simulation.scenario import Scenario
+from ddsi.simulation.scenario import Create, Scenario
+from ddsi.structure.qos_policies import BestEffort, Reliable
 from ddsi.trace.sink import JsonLinesSink
 
 ROOT = Path(__file__).parents[2]
-# With restarts, partitions, fragments and every kind of weather among them.
-SEEDS = (4, 23, 104, 188)
+# With restarts, partitions, fragments, filtering writers, slow readers and every kind of weather among them.
+SEEDS = (4, 23, 120, 205)
 
 
 class _Digest:
@@ -89,10 +90,23 @@ def test_plans_follow_from_the_seed_alone() -> None:
 def test_seeds_cover_every_kind_of_step_and_weather() -> None:
     plans = [Scenario.from_seed(seed) for seed in range(200)]
     kinds = {type(step).__name__ for plan in plans for step in plan.steps}
-    assert kinds == {"Create", "Cut", "Delete", "End", "Restart", "Wait", "Write"}
+    assert kinds == {"Create", "Cut", "Delete", "End", "Restart", "Take", "Wait", "Write"}
     assert any(plan.conditions.loss > 0.2 for plan in plans)
     assert any(plan.conditions.reordering and not plan.conditions.loss for plan in plans)
     assert any(plan.conditions.duplication for plan in plans)
     assert any(plan.conditions.delay >= 0.1 for plan in plans)
     assert any(not plan.multicast for plan in plans)
     assert any(len(set(plan.hosts)) < len(plan.hosts) for plan in plans)
+
+
+def test_seeds_cover_every_kind_of_endpoint() -> None:
+    plans = [Scenario.from_seed(seed) for seed in range(200)]
+    created = [[step.endpoint for step in plan.steps if isinstance(step, Create)] for plan in plans]
+    filtered = [{plan.is_writer for plan in plans if plan.is_filtered} for plans in created]
+    assert filtered.count({True, False}) > 20, "a filtering writer and somebody to read it"
+    endpoints = [plan for plans in created for plan in plans]
+    assert any(not plan.takes and plan.qos.reliability == Reliable() for plan in endpoints)
+    assert any(not plan.takes and plan.qos.reliability == BestEffort() for plan in endpoints)
+    assert any(plan.is_writer and plan.qos.lifespan is not None for plan in endpoints)
+    assert any(plan.is_keyed for plan in endpoints)
+    assert any(plan.qos.partition is not None for plan in endpoints)
