@@ -10,6 +10,7 @@ from importlib import import_module, metadata
 from typing import NoReturn, Protocol, cast
 
 from ..structure.errors import DdsError
+from ..transport.wall_clock import wall_clock
 from .exit_status import CommandError, ExitStatus
 
 __all__ = ["ENTRY_POINT_GROUP", "Command", "main"]
@@ -38,7 +39,10 @@ class Command(Protocol):
         """Declare options and positional arguments."""
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Do it; returns the exit status.  CommandError and DdsError become one sentence and status 2."""
+        """Do it; returns the exit status.  CommandError and DdsError become one sentence and status 2.
+
+        A command of another package finds in ``arguments.wall_clock`` a function that gives the ns since 1970.
+        """
         ...
 
 
@@ -93,7 +97,7 @@ def _parse(words: Sequence[str]) -> tuple[Command, argparse.Namespace]:
             subparsers.add_parser(name, help=summary)
     if command is None:
         command = _add_foreign(subparsers, chosen)
-    arguments = parser.parse_args(words)
+    arguments = parser.parse_args(words, argparse.Namespace(wall_clock=wall_clock))
     if command is None:
         parser.error("a command is wanted")
     return command, arguments

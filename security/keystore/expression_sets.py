@@ -1,0 +1,66 @@
+"""Does one topic expression mean all that another means?  Can two mean the same topic?  For rules about rules.
+
+DDS-Security 1.1 §9.4.1.3.2.3 (fnmatch).  ``*`` and ``?`` are understood; of ``[...]`` only that it may be any one
+character.  :func:`covers` says yes only when it is sure, :func:`overlaps` says no only when it is sure, so that what
+the linter complains of is so.  Time is the product of the lengths.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from ..access_control.wildcard import matches
+
+__all__ = ["covers", "is_literal", "overlaps"]
+
+_STAR, _ANY = "*", "?"
+_TOKEN: Final = re.compile(r"\[!?\]?[^\]]*\]|.", re.DOTALL)
+
+
+def is_literal(expression: str) -> bool:
+    """Does it mean the topic of just this name?"""
+    return not any(character in expression for character in "*?[")
+
+
+def covers(wide: str, narrow: str) -> bool:
+    """Is every name that ``narrow`` matches one that ``wide`` matches?  False where it is hard to tell."""
+    if wide in (narrow, _STAR):
+        return True
+    if is_literal(narrow):
+        return matches(wide, narrow)
+    if "[" in wide:
+        return False
+    # Narrow is taken as a text of tokens.  Of "?" and "[...]" nothing is known but that they are a character, and only
+    # a star can stand for a star.  reachable[j]: the tokens of wide so far match the first j of narrow.
+    text = _TOKEN.findall(narrow)
+    reachable = [True] + [False] * len(text)
+    for token in wide:
+        above, reachable = reachable, [reachable[0] and token == _STAR] + [False] * len(text)
+        for j, other in enumerate(text):
+            if token == _STAR:
+                reachable[j + 1] = above[j + 1] or reachable[j]
+            else:
+                reachable[j + 1] = above[j] and other != _STAR and token in (_ANY, other)
+    return reachable[-1]
+
+
+def overlaps(first: str, second: str) -> bool:
+    """Is there a name that both match?  True where it is hard to tell."""
+    left, right = _TOKEN.findall(first), _TOKEN.findall(second)
+    # reachable[j]: the tokens of left so far and the first j of right can mean one text.
+    reachable = [True]
+    for token in right:
+        reachable.append(reachable[-1] and token == _STAR)
+    for one in left:
+        above, reachable = reachable, [reachable[0] and one == _STAR]
+        for j, other in enumerate(right):
+            if _STAR in (one, other):  # the star means nothing here, or takes what the other stands for
+                reachable.append(above[j + 1] or reachable[j])
+            else:
+                reachable.append(above[j] and _may_be_same(one, other))
+    return reachable[-1]
+
+
+def _may_be_same(one: str, other: str) -> bool:
+    return one == other or _ANY in (one, other) or one.startswith("[") or other.startswith("[")
