@@ -1,0 +1,235 @@
+"""AesGcmGmacTransform: protects what is sent, and opens what is received.
+
+DDS-Security 1.1 §9.5.3.3 (CryptoTransform); the operations are those of §8.5.1.9.  Which octets and which keys is
+decided here; what is done with them in :mod:`.payload` and :mod:`.envelope`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Refused, Rejected
+from ddsi.structure.errors import MalformedMessage
+
+from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
+from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
+from . import envelope, payload
+from .crypto_handles import (
+    NO_KEY,
+    LocalParticipant,
+    LocalReader,
+    LocalWriter,
+    RemoteParticipant,
+    RemoteReader,
+    RemoteWriter,
+)
+from .session_keys import ReceiverKey, SendingKey
+from .transformation import NO_KEY_ID
+
+__all__ = ["AesGcmGmacTransform"]
+
+
+class AesGcmGmacTransform:
+    """CryptoTransform (§9.5.3.3)."""
+
+    def overhead(
+        self,
+        sender: ParticipantCryptoHandle | DatawriterCryptoHandle | DatareaderCryptoHandle,
+        receivers: int,
+    ) -> Overhead:
+        """Of a participant: of its messages.  Of an endpoint: of its submessages and payloads, not of the message."""
+        if isinstance(sender, LocalParticipant):
+            return Overhead(message=envelope.message_overhead(sender.protection, receivers))
+        assert isinstance(sender, LocalWriter | LocalReader)
+        return Overhead(
+            payload=payload.overhead(sender.payload) if isinstance(sender, LocalWriter) else 0,
+            submessage=envelope.submessage_overhead(sender.submessage, receivers),
+        )
+
+    # --- outwards --------------------------------------------------------------------------------------------
+
+    def encode_serialized_payload(
+        self,
+        encoded_buffer: bytearray,
+        extra_inline_qos: bytearray,
+        plain_buffer: Octets,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+    ) -> Refused | None:
+        """§8.5.1.9.1.  Padded to a multiple of 4 where it is none; no inline QoS is added."""
+        assert isinstance(sending_datawriter_crypto, LocalWriter)
+        key = sending_datawriter_crypto.payload_key
+        return NO_KEY if key is None else payload.encode_payload(encoded_buffer, plain_buffer, key)
+
+    def encode_datawriter_submessage(
+        self,
+        encoded_rtps_submessage: bytearray,
+        plain_rtps_submessage: Octets,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+        receiving_datareader_crypto_list: Sequence[DatareaderCryptoHandle],
+    ) -> Refused | None:
+        """§8.5.1.9.2.  Of the volatile writer: for one reader, as each has a key of its own."""
+        assert isinstance(sending_datawriter_crypto, LocalWriter)
+        return _encode_submessage(
+            encoded_rtps_submessage,
+            plain_rtps_submessage,
+            sending_datawriter_crypto,
+            receiving_datareader_crypto_list,
+        )
+
+    def encode_datareader_submessage(
+        self,
+        encoded_rtps_submessage: bytearray,
+        plain_rtps_submessage: Octets,
+        sending_datareader_crypto: DatareaderCryptoHandle,
+        receiving_datawriter_crypto_list: Sequence[DatawriterCryptoHandle],
+    ) -> Refused | None:
+        """§8.5.1.9.3.  Of the volatile reader: for one writer, as each has a key of its own."""
+        assert isinstance(sending_datareader_crypto, LocalReader)
+        return _encode_submessage(
+            encoded_rtps_submessage,
+            plain_rtps_submessage,
+            sending_datareader_crypto,
+            receiving_datawriter_crypto_list,
+        )
+
+    def encode_rtps_message(
+        self,
+        encoded_rtps_message: bytearray,
+        plain_rtps_message: Octets,
+        sending_participant_crypto: ParticipantCryptoHandle,
+        receiving_participant_crypto_list: Sequence[ParticipantCryptoHandle],
+    ) -> Refused | None:
+        """§8.5.1.9.4."""
+        assert isinstance(sending_participant_crypto, LocalParticipant)
+        key, protection = sending_participant_crypto.key, sending_participant_crypto.protection
+        if key is None or protection is None:
+            return NO_KEY
+        receivers = _receiver_keys(receiving_participant_crypto_list) if protection.origin_authenticated else ()
+        return envelope.seal_message(encoded_rtps_message, plain_rtps_message, key, receivers)
+
+    # --- inwards ---------------------------------------------------------------------------------------------
+
+    def decode_rtps_message(
+        self,
+        encoded_rtps_message: Octets,
+        receiving_participant_crypto: ParticipantCryptoHandle,
+        sending_participant_crypto: ParticipantCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.5.  The header of what is returned was authenticated, by the INFO_SRC that came protected."""
+        assert isinstance(sending_participant_crypto, RemoteParticipant)
+        remote = sending_participant_crypto
+        return envelope.open_message(encoded_rtps_message, remote.ring, remote.local.protection)
+
+    def preprocess_secure_submsg(
+        self,
+        encoded_rtps_submessage: Octets,
+        receiving_participant_crypto: ParticipantCryptoHandle,
+        sending_participant_crypto: ParticipantCryptoHandle,
+    ) -> SecureSubmessage | Outcome:
+        """§8.5.1.9.6.  Where several local endpoints have the key, the one that it bears a MAC for.
+
+        Key id 0 is that of the pairwise key, under which both volatile endpoints of the sender write: it is
+        INFO_SUBMESSAGE with the handles of both, and either decoder opens it.
+        """
+        assert isinstance(sending_participant_crypto, RemoteParticipant)
+        remote = sending_participant_crypto
+        try:
+            key_id = envelope.read_crypto_header(encoded_rtps_submessage)[4:8]
+            if key_id == NO_KEY_ID:
+                return _volatile(remote)
+            senders = remote.senders.get(key_id)
+            if not senders:
+                return NoKeys(key_id)
+            sender = senders[0] if len(senders) == 1 else _addressed(senders, key_id, encoded_rtps_submessage)
+        except MalformedMessage as error:
+            return Rejected(str(error))
+        if isinstance(sender, RemoteWriter):
+            return SecureSubmessage(SecureSubmessageCategory.DATAWRITER_SUBMESSAGE, sender, sender.reader)
+        return SecureSubmessage(SecureSubmessageCategory.DATAREADER_SUBMESSAGE, sender.writer, sender)
+
+    def decode_datawriter_submessage(
+        self,
+        encoded_rtps_submessage: Octets,
+        receiving_datareader_crypto: DatareaderCryptoHandle,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.7.  The sender's handle is that of the pair, and knows its reader."""
+        sender = sending_datawriter_crypto
+        assert isinstance(sender, RemoteWriter)
+        return envelope.open_submessage(encoded_rtps_submessage, sender.ring, sender.reader.submessage)
+
+    def decode_datareader_submessage(
+        self,
+        encoded_rtps_submessage: Octets,
+        receiving_datawriter_crypto: DatawriterCryptoHandle,
+        sending_datareader_crypto: DatareaderCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.8.  The sender's handle is that of the pair, and knows its writer."""
+        sender = sending_datareader_crypto
+        assert isinstance(sender, RemoteReader)
+        return envelope.open_submessage(encoded_rtps_submessage, sender.ring, sender.writer.submessage)
+
+    def decode_serialized_payload(
+        self,
+        encoded_buffer: Octets,
+        inline_qos: Octets,
+        receiving_datareader_crypto: DatareaderCryptoHandle,
+        sending_datawriter_crypto: DatawriterCryptoHandle,
+    ) -> Octets | Outcome:
+        """§8.5.1.9.9.  The sender's handle is that of the pair, and knows its reader."""
+        sender = sending_datawriter_crypto
+        assert isinstance(sender, RemoteWriter)
+        return payload.decode_payload(encoded_buffer, sender.payload_ring, sender.reader.payload)
+
+
+_Receivers = Sequence[ParticipantCryptoHandle] | Sequence[DatareaderCryptoHandle] | Sequence[DatawriterCryptoHandle]
+
+
+def _encode_submessage(
+    buffer: bytearray, submessage: Octets, sender: LocalWriter | LocalReader, receivers: _Receivers
+) -> Refused | None:
+    if sender.is_volatile:
+        return _encode_volatile(buffer, submessage, receivers)
+    key, protection = sender.submessage_key, sender.submessage
+    if key is None or protection is None:
+        return NO_KEY
+    receiver_keys = _receiver_keys(receivers) if protection.origin_authenticated else ()
+    return envelope.seal_submessage(buffer, submessage, key, receiver_keys)
+
+
+def _encode_volatile(buffer: bytearray, submessage: Octets, receivers: _Receivers) -> Refused | None:
+    if len(receivers) != 1:
+        return Refused(f"a volatile submessage is for one receiver, not for {len(receivers)}")
+    receiver = receivers[0]
+    assert isinstance(receiver, RemoteReader | RemoteWriter)
+    key: SendingKey | None = receiver.participant.exchange_key
+    return NO_KEY if key is None else envelope.seal_submessage(buffer, submessage, key, ())
+
+
+def _receiver_keys(receivers: _Receivers) -> list[ReceiverKey]:
+    keys = []
+    for receiver in receivers:
+        assert isinstance(receiver, RemoteParticipant | RemoteReader | RemoteWriter)
+        if receiver.receiver_key is not None:
+            keys.append(receiver.receiver_key)
+    return keys
+
+
+def _volatile(remote: RemoteParticipant) -> SecureSubmessage | Outcome:
+    writer, reader = remote.volatile_writer, remote.volatile_reader
+    if writer is None or reader is None:
+        return NoKeys(NO_KEY_ID)
+    return SecureSubmessage(SecureSubmessageCategory.INFO_SUBMESSAGE, writer, reader)
+
+
+def _addressed(
+    senders: Sequence[RemoteWriter | RemoteReader], key_id: bytes, octets: Octets
+) -> RemoteWriter | RemoteReader:
+    """Of the pairs that have this key, the one whose receiver-specific key a MAC was made with; else the first."""
+    pairs = [(sender, key) for sender in senders for key in sender.ring.find(key_id)]
+    if any(key.receiver_key_id != NO_KEY_ID for _, key in pairs):
+        addressed = envelope.receiver_key_ids(octets, encrypted=pairs[0][1].encrypts)
+        for sender, key in pairs:
+            if key.receiver_key_id in addressed:
+                return sender
+    return senders[0]
