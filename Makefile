@@ -14,7 +14,7 @@ export CYCLONEDDS_URI := <CycloneDDS><Domain><General><Interfaces><NetworkInterf
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick lint format interop bench clean
+.PHONY: help demo test quick lint format interop fuzz bench clean
 
 help:  ## Say what can be made
 	@grep -hE '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -41,11 +41,14 @@ format: $(VENV)/.ready-to-lint  ## Let ruff lay out the code
 interop: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## Every case with every peer; writes docs/interop
 	$(BIN)/python -m multiproc_tests.interop $(ARGS)
 
+fuzz: $(VENV)/.ready-to-fuzz  ## Coverage-guided, one TARGET for SECONDS; without a TARGET, all in turn
+	$(BIN)/python -m tests.fuzz $(or $(TARGET),all) $(or $(SECONDS),60)
+
 bench: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## Beside the C-backed binding, as ratios
 	$(BIN)/python -m benchmarks $(ARGS)
 
 clean:  ## Remove what was made, the virtual environment too
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz
 	find $(PACKAGES) security -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # An editable install finds the packages by a hook, which type checkers and editors do not run.  They do read .pth files.
@@ -80,6 +83,10 @@ $(VENV)/.ready-to-test: $(VENV)/.ready-to-run pyproject.toml
 
 $(VENV)/.ready-to-lint: $(VENV)/.ready-to-test pyproject.toml
 	$(BIN)/python -m pip install --quiet --group lint
+	@touch $@
+
+$(VENV)/.ready-to-fuzz: $(VENV)/.ready-to-test pyproject.toml
+	$(BIN)/python -m pip install --quiet --group fuzz
 	@touch $@
 
 # There are no wheels of the peers for every platform, so doing without them is an error only where they are required.
