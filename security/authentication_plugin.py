@@ -9,6 +9,7 @@ from typing import Protocol
 from ddsi.spi import Refused
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos_policies import Properties
+from ddsi.structure.vendor import VendorId
 
 from .handles import HandshakeHandle, IdentityHandle, Pending, SharedSecretHandle
 from .tokens import (
@@ -103,10 +104,15 @@ class Authentication(Protocol):
         local_identity_handle: IdentityHandle,
         remote_identity_token: IdentityToken,
         remote_participant_guid: Guid,
+        *,
+        remote_vendor_id: VendorId | None = None,
     ) -> RemoteIdentity | Refused | Pending[RemoteIdentity | Refused]:
         """§8.3.2.11.3.  A participant was discovered that announces an identity token.
 
-        ``remote_auth_request_token`` is NIL if none has come.  The lower Guid of the two begins the handshake.
+        ``remote_auth_request_token`` is NIL if none has come; when one comes later, it is brought by a further call,
+        which gives the same handle.  The lower Guid of the two begins the handshake.  ``remote_vendor_id`` is that of
+        the RTPS header, None if it is not known: not the OMG's, but vendors differ in what octets they take, and the
+        prefix of a secured participant's Guid does not tell the vendor.
         """
         ...
 
@@ -135,11 +141,19 @@ class Authentication(Protocol):
     def process_handshake(
         self, handshake_message_in: HandshakeMessageToken, handshake_handle: HandshakeHandle
     ) -> HandshakeStep | Refused | Pending[HandshakeStep | Refused]:
-        """§8.3.2.11.6.  Each further message.  Refused leaves the handshake as it was: anybody can send one."""
+        """§8.3.2.11.6.  Each further message.  Refused leaves the handshake as it was: anybody can send one.
+
+        The handle of the step takes the place of the one given, which may then be returned.  A message that comes again
+        gives the same step again: so a repeated Request, Reply or Final is answered as it was before.
+        """
         ...
 
     def get_shared_secret(self, handshake_handle: HandshakeHandle) -> SharedSecretHandle:
-        """§8.3.2.11.7.  Once the handshake is OK or OK_FINAL_MESSAGE; the key factory wants it."""
+        """§8.3.2.11.7.  Once the handshake is OK or OK_FINAL_MESSAGE; the key factory wants it.
+
+        With this call or :meth:`get_authenticated_peer_credential_token` the remote identity counts as proven: it has a
+        subject name then, and its expiry is watched.
+        """
         ...
 
     def get_authenticated_peer_credential_token(

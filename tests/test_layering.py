@@ -61,7 +61,7 @@ _CONFINED: list[tuple[set[str], tuple[str, ...]]] = [
     # the environment
     ({"config", "cli"}, ("os.environ", "os.getenv")),
     # what only an extra brings, or only few programs need
-    ({SECURITY}, ("cryptography", "lxml")),
+    ({SECURITY}, ("cryptography", "lxml", "pkcs11")),
     ({"cli"}, ("rich", "cyclonedds")),
     ({"xtypes"}, ("numpy",)),
     ({"storage"}, ("sqlite3",)),
