@@ -12,15 +12,16 @@ from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.qos_policies import BinaryProperty, Properties, Property
 
 from .attributes import DataTags
+from .properties import DATA_TAG_PREFIX
 
-__all__ = ["DATA_TAG_PREFIX", "PropertyDataTagging"]
-
-DATA_TAG_PREFIX: Final = "dds.sec.data_tag."
-"""``Qos(properties={"dds.sec.data_tag.classification": "secret"})`` ties the tag ``classification`` to an endpoint."""
+__all__ = ["PropertyDataTagging"]
 
 
 class PropertyDataTagging:
-    """The tags in the order of the properties.  Implements :class:`ddsi_security.plugins.DataTagging`."""
+    """Of a writer with ``Qos(properties={"dds.sec.data_tag.classification": "secret"})``, the tag ``classification``.
+
+    The tags are in the order of the properties.  Implements :class:`ddsi_security.plugins.DataTagging`.
+    """
 
     plugin_version: Final = 1
 
