@@ -372,7 +372,12 @@ class StatefulWriter:
     def receive_acknack(
         self, proxy: ReaderProxy, requested: NumberSet, count: int, now: float, *, final: bool
     ) -> list[WriterTransmission]:
-        """ACKNACK: all below ``requested.base`` arrived, the members are missing.  RTPS 2.5 §8.4.9.2, §8.3.8.1."""
+        """ACKNACK: all below ``requested.base`` arrived, the members are missing.  RTPS 2.5 §8.4.9.2, §8.3.8.1.
+
+        From a best-effort reader it means nothing (§8.4.9.1 knows no such transition).
+        """
+        if not (self.is_reliable and proxy.is_reliable):
+            return []
         preemptive = requested.base <= 1 and not requested and not final
         if preemptive:
             proxy.accepts_acknack(count, now)
@@ -429,7 +434,7 @@ class StatefulWriter:
         self, proxy: ReaderProxy, sequence_number: int, missing: NumberSet, count: int, now: float
     ) -> list[WriterTransmission]:
         """NACK_FRAG: some fragments of one change are missing.  RTPS 2.5 §8.3.8.10, §8.4.14.1."""
-        if not proxy.accepts_nack_frag(count, now):
+        if not (self.is_reliable and proxy.is_reliable and proxy.accepts_nack_frag(count, now)):
             return []
         proxy.progress_time = now
         if sequence_number > min(self.next_unsent_sn, self.cache.last_sn):

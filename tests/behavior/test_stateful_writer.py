@@ -536,3 +536,14 @@ def test_relevant_is_what_is_for_everybody_for_this_reader_or_for_its_participan
 ) -> None:
     proxy = match(stateful_writer(), 2)
     assert proxy.is_relevant(change(1, destination=destination)) is expected
+
+
+@pytest.mark.parametrize("offered", [RELIABLE_QOS, BEST_EFFORT])
+def test_a_best_effort_reader_has_nothing_to_ask(offered: Qos) -> None:
+    """No reader of that kind sends ACKNACK or NACK_FRAG; whoever does in its name gets no answer."""
+    writer = stateful_writer(offered, fragment_octets=100)
+    proxy = match(writer, qos=BEST_EFFORT)
+    send(writer, b"", bytes(1000))
+    assert acknack(writer, proxy, 1, 1, 2, count=1, final=False) == []
+    assert writer.receive_nack_frag(proxy, 2, numbers(1, 1), 1, 0.0) == []
+    assert writer.next_deadline() == math.inf
