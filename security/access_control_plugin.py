@@ -46,8 +46,13 @@ class AccessControl(Protocol):
         identity: IdentityHandle,
         domain_id: int,
         participant_properties: Properties,
+        *,
+        domain_tag: str = "",
     ) -> PermissionsHandle | Pending[PermissionsHandle]:
-        """§8.4.2.9.1.  After validate_local_identity.  Raises ConfigurationError for documents that cannot be used."""
+        """§8.4.2.9.1.  After validate_local_identity.  Raises ConfigurationError for documents that cannot be used.
+
+        ``domain_tag``, which 1.1 lacks, holds for all checks by the handle: rules of 1.2 may be for tags.
+        """
         ...
 
     def validate_remote_permissions(
@@ -184,19 +189,19 @@ class AccessControl(Protocol):
     def get_topic_sec_attributes(
         self, permissions_handle: PermissionsHandle, topic_name: str
     ) -> TopicSecurityAttributes:
-        """§8.4.2.9.23."""
+        """§8.4.2.9.23.  Asked for topics of peers too: what governance has no rule for is protected in every way."""
         ...
 
     def get_datawriter_sec_attributes(
         self, permissions_handle: PermissionsHandle, topic_name: str, partition: Partition, data_tag: DataTags
     ) -> EndpointSecurityAttributes:
-        """§8.4.2.9.24.  Builtin writers too, by the names of their topics."""
+        """§8.4.2.9.24.  Builtin writers too, by the topics' names.  Raises NotAllowedBySecurity where no rule is."""
         ...
 
     def get_datareader_sec_attributes(
         self, permissions_handle: PermissionsHandle, topic_name: str, partition: Partition, data_tag: DataTags
     ) -> EndpointSecurityAttributes:
-        """§8.4.2.9.25.  Builtin readers too, by the names of their topics."""
+        """§8.4.2.9.25.  Builtin readers too, by the topics' names.  Raises NotAllowedBySecurity where no rule is."""
         ...
 
     def return_permissions_handle(self, handle: PermissionsHandle) -> None:

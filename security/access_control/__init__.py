@@ -5,3 +5,7 @@ Bottom up: ``der``, ``cms`` and ``smime`` verify who signed a document; ``xml_do
 what is allowed is protected; ``plugin`` holds the documents of a participant and answers by them.  All but the plugin
 are pure functions, which the keystore's tools use as well.
 """
+
+from .plugin import PermissionsAccessControl
+
+__all__ = ["PermissionsAccessControl"]

@@ -16,6 +16,7 @@ from ddsi.spi import Refused
 
 from ..attributes import DataTags
 from .decision import Decision, Step, decide, decide_participant, decide_topic
+from .document_error import shown
 from .governance import DomainRule, TopicRule
 from .permissions import ActionKind, Grant
 
@@ -105,13 +106,13 @@ def _open(domain_rule: DomainRule, why: str, topic_rule: TopicRule | None = None
 
 
 def _no_topic_rule(domain_rule: DomainRule, topic: str) -> Decision:
-    why = f"no topic_rule of it matches {topic!r}"
+    why = f"no topic_rule of it matches {shown(topic)}"
     step = _domain_step(domain_rule, why)
-    expressions = ", ".join(repr(rule.expression) for rule in domain_rule.topic_rules[:5])
+    expressions = ", ".join(shown(rule.expression) for rule in domain_rule.topic_rules[:5])
     return Decision(
         False,
         f"governance {domain_rule.document}, line {domain_rule.line}, {domain_rule.label}: no topic_rule matches topic "
-        f"{topic!r}; its topic_expressions are {expressions}. Missing: a topic_rule for {topic!r}",
+        f"{shown(topic)}; its topic_expressions are {expressions}. Missing: a topic_rule for {shown(topic)}",
         (step,),
     )
 
@@ -123,5 +124,5 @@ def _domain_step(rule: DomainRule, why: str) -> Step:
 def _topic_steps(domain_rule: DomainRule, rule: TopicRule, why: str) -> tuple[Step, ...]:
     return (
         _domain_step(domain_rule, f"is for {domain_rule.domains}"),
-        Step(rule.document, rule.line, rule.label, repr(rule.expression), True, why),
+        Step(rule.document, rule.line, rule.label, shown(rule.expression), True, why),
     )

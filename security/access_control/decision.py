@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 from ddsi.spi import Refused
 
 from ..attributes import DataTags
+from .document_error import shown
 from .permissions import ActionKind, Criterion, Grant, Rule
 from .wildcard import matching
 
@@ -62,20 +63,6 @@ class Decision:
         return None if self.allowed else Refused(self.reason)
 
 
-@dataclass(frozen=True, slots=True)
-class _Miss:
-    """Why a criterion did not apply, for its step, and what its rule does instead, for the sentence of a refusal.
-
-    Of several the one with the highest ``rank`` came nearest.
-    """
-
-    rank: int
-    line: int
-    why: str
-    instead: str = ""
-    topics: tuple[str, ...] = ()
-
-
 def decide(
     grant: Grant,
     *,
@@ -92,36 +79,38 @@ def decide(
     enough, and it covers all that it does not name.
     """
     names = tuple(partitions) or ("",)
-    what = f"{kind.value} topic {topic!r}{_in_partitions(partitions)}{_with_tags(data_tags)} of domain {domain_id}"
-    right = f"{kind.value} {topic!r}{_in_partitions(partitions)}{_with_tags(data_tags)}"
 
-    def fits(rule: Rule, criterion: Criterion) -> _Miss | None:
-        if (miss := _misses_topic(rule, criterion, kind, topic)) is not None:
-            return miss
-        covers = _allow_covers if rule.is_allow else _deny_covers
-        return covers(criterion, names, data_tags)
+    def covers(rule: Rule, criterion: Criterion) -> _Miss | None:
+        return (_allow_covers if rule.is_allow else _deny_covers)(criterion, names, data_tags)
 
-    return _search(grant, domain_id, domain_tag, what, right, fits)
+    found = _search(grant, domain_id, domain_tag, kind, topic, covers)
+    details = f"{_in_partitions(partitions)}{_with_tags(data_tags)}"
+    what = f"{kind.value} topic {shown(topic)}{details} of domain {domain_id}"
+    if found.allowed or found.by_rule:
+        return Decision(found.allowed, f"{grant}: {found.by_rule or 'by default it may'} {what}", found.steps)
+    right = f"{kind.value} {shown(topic)}{details}"
+    return Decision(False, _refusal(grant, what, right, topic, found.misses), found.steps)
 
 
 def decide_topic(grant: Grant, *, domain_id: int, topic: str, domain_tag: str = "") -> Decision:
-    """May it publish or subscribe ``topic`` in some partition?  A topic has neither partition nor tags (§8.4.2.9.6)."""
-    decisions: list[Decision] = []
-    for kind in (ActionKind.PUBLISH, ActionKind.SUBSCRIBE):
+    """May it publish, subscribe or relay ``topic`` in some partition?  A topic has none, and no tags (§8.4.2.9.6)."""
 
-        def fits(rule: Rule, criterion: Criterion, kind: ActionKind = kind) -> _Miss | None:
-            if (miss := _misses_topic(rule, criterion, kind, topic)) is not None:
-                return miss
-            if not rule.is_allow and (criterion.partitions or criterion.data_tags):
-                return _Miss(3, criterion.line, "denies some partitions or data tags, not the topic")
-            return None
+    def covers(rule: Rule, criterion: Criterion) -> _Miss | None:
+        if not rule.is_allow and (criterion.partitions or criterion.data_tags):
+            return _Miss(3, criterion.line, "denies some partitions or data tags, not the topic")
+        return None
 
-        what = f"use topic {topic!r} of domain {domain_id}"
-        decisions.append(_search(grant, domain_id, domain_tag, what, f"publish or subscribe {topic!r}", fits))
-        if decisions[-1].allowed:
-            break
-    last = decisions[-1]
-    return Decision(last.allowed, last.reason, tuple(step for decision in decisions for step in decision.steps))
+    steps: tuple[Step, ...] = ()
+    misses: tuple[_Miss, ...] = ()
+    for kind in ActionKind:
+        found = _search(grant, domain_id, domain_tag, kind, topic, covers)
+        if found.allowed:
+            what = f"{kind.value} topic {shown(topic)} of domain {domain_id}"
+            return Decision(True, f"{grant}: {found.by_rule or 'by default it may'} {what}", found.steps)
+        steps += found.steps
+        misses += found.misses
+    what = f"publish, subscribe or relay topic {shown(topic)} of domain {domain_id}"
+    return Decision(False, _refusal(grant, what, f"publish or subscribe {shown(topic)}", topic, misses), steps)
 
 
 def decide_participant(grant: Grant, *, domain_id: int, domain_tag: str = "") -> Decision:
@@ -158,14 +147,39 @@ def decide_participant(grant: Grant, *, domain_id: int, domain_tag: str = "") ->
 # --- the search ----------------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True, slots=True)
+class _Miss:
+    """Why a criterion did not apply, for its step, and what its rule does instead, for the sentence of a refusal.
+
+    Of several the one with the highest ``rank`` came nearest.
+    """
+
+    rank: int
+    line: int
+    why: str
+    instead: str = ""
+    topics: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """``by_rule``: which rule decided, up to the verb; "" where the default did.  ``misses``: of allow rules alone."""
+
+    allowed: bool
+    by_rule: str
+    steps: tuple[Step, ...]
+    misses: tuple[_Miss, ...]
+
+
 def _search(
     grant: Grant,
     domain_id: int,
     domain_tag: str,
-    what: str,
-    right: str,
-    fits: Callable[[Rule, Criterion], _Miss | None],
-) -> Decision:
+    kind: ActionKind,
+    topic: str,
+    covers: Callable[[Rule, Criterion], _Miss | None],
+) -> _Found:
+    """The first criterion of this kind and for this topic that ``covers`` has nothing against, in document order."""
     steps: list[Step] = []
     misses: list[_Miss] = []
     for rule in grant.rules:
@@ -174,33 +188,29 @@ def _search(
             misses += [_Miss(0, rule.line, "", f"is for {rule.domains}")] if rule.is_allow else []
             continue
         for criterion in rule.criteria:
-            miss = fits(rule, criterion)
+            miss = _misses_topic(rule, criterion, kind, topic) or covers(rule, criterion)
             if miss is None:
                 steps.append(_step(grant, rule, "applies, and decides", criterion, applies=True))
-                does = "lets it" if rule.is_allow else "forbids it to"
-                reason = f"{grant}: the {rule.label} in line {rule.line}, by line {criterion.line}, {does} {what}"
-                return Decision(rule.is_allow, reason, tuple(steps))
+                verb = "lets it" if rule.is_allow else "forbids it to"
+                by_rule = f"the {rule.label} in line {rule.line}, by line {criterion.line}, {verb}"
+                return _Found(rule.is_allow, by_rule, tuple(steps), tuple(misses))
             steps.append(_step(grant, rule, miss.why, criterion))
             misses += [miss] if rule.is_allow else []
         if not rule.criteria:
             steps.append(_step(grant, rule, "names no topics"))
     steps.append(_default_step(grant))
-    if grant.default_allow:
-        return Decision(True, f"{grant}: no rule is about it, and by default it may {what}", tuple(steps))
-    reason = f"{grant}: no allow rule lets it {what}{_nearest(misses, right)}. Missing right: {right}"
-    return Decision(False, reason, tuple(steps))
+    return _Found(grant.default_allow, "", tuple(steps), tuple(misses))
 
 
 def _misses_topic(rule: Rule, criterion: Criterion, kind: ActionKind, topic: str) -> _Miss | None:
     if criterion.kind is not kind:
         why = f"is about {criterion.kind.value}, not {kind.value}"
         return _Miss(1, rule.line, why, f"lets it {criterion.kind.value}, not {kind.value}")
-    if not matching(criterion.topics, topic):
-        topics = _listed(criterion.topics)
-        return _Miss(
-            2, criterion.line, f"topic {topic!r} is none of {topics}", f"allows topics {topics}", criterion.topics
-        )
-    return None
+    if matching(criterion.topics, topic):
+        return None
+    topics = _listed(criterion.topics)
+    why = f"topic {shown(topic)} is none of {topics}"
+    return _Miss(2, criterion.line, why, f"allows topics {topics}", criterion.topics)
 
 
 def _allow_covers(criterion: Criterion, partitions: tuple[str, ...], data_tags: DataTags) -> _Miss | None:
@@ -208,12 +218,12 @@ def _allow_covers(criterion: Criterion, partitions: tuple[str, ...], data_tags: 
     for partition in partitions:
         if not matching(expressions, partition):
             allowed = f"partitions {_listed(expressions)}" if criterion.partitions else "the default partition alone"
-            why = f"covers {allowed}, not partition {partition!r}"
+            why = f"covers {allowed}, not partition {shown(partition)}"
             return _Miss(3, criterion.line, why, f"allows the topic in {allowed}")
     for tag in data_tags:
         if tag not in criterion.data_tags:
             allowed = _tags(criterion.data_tags)
-            return _Miss(4, criterion.line, f"covers {allowed}, not {tag[0]}={tag[1]}", f"allows {allowed}")
+            return _Miss(4, criterion.line, f"covers {allowed}, not {shown(f'{tag[0]}={tag[1]}')}", f"allows {allowed}")
     return None
 
 
@@ -228,6 +238,7 @@ def _deny_covers(criterion: Criterion, partitions: tuple[str, ...], data_tags: D
 # --- words ---------------------------------------------------------------------------------------------------
 
 _MOST_LISTED = 5
+_MOST_COMPARED = 200
 
 
 def _step(grant: Grant, rule: Rule, why: str, criterion: Criterion | None = None, *, applies: bool = False) -> Step:
@@ -240,36 +251,36 @@ def _default_step(grant: Grant) -> Step:
     return Step(grant.document, grant.line, f"grant {grant.name!r}" if grant.name else "grant", "", True, why)
 
 
-def _nearest(misses: Sequence[_Miss], right: str) -> str:
-    """The allow rule that came nearest to ``right``, as an insertion into the sentence."""
+def _refusal(grant: Grant, what: str, right: str, topic: str, misses: Sequence[_Miss]) -> str:
+    return f"{grant}: no allow rule lets it {what}; {_nearest(misses, topic)}. Missing right: {right}"
+
+
+def _nearest(misses: Sequence[_Miss], topic: str) -> str:
+    """What the allow rule says that came nearest."""
     if not misses:
-        return "; it has no allow rule"
-    nearest_rank = max(miss.rank for miss in misses)
-    candidates = [miss for miss in misses if miss.rank == nearest_rank][:50]
+        return "it has no allow rule"
+    highest = max(miss.rank for miss in misses)
+    candidates = [miss for miss in misses if miss.rank == highest][:_MOST_COMPARED]
     nearest = candidates[0]
-    if len(candidates) > 1:
-        # Of several for other topics, the one whose topic is spelt most alike; bounded, as it takes time.
-        topics = {topic[:100]: miss for miss in reversed(candidates) for topic in miss.topics[:50]}
-        if near := difflib.get_close_matches(right.partition(" ")[2].strip("'")[:100], list(topics), n=1, cutoff=0.3):
-            nearest = topics[near[0]]
-    return f"; the nearest, at line {nearest.line}, {nearest.instead}"
+    # Of several for other topics, the one whose topic is spelt most alike; bounded, as comparing takes time.
+    topics = {name[:100]: miss for miss in reversed(candidates) for name in miss.topics[:_MOST_LISTED]}
+    names = list(topics)[-_MOST_COMPARED:]
+    if len(candidates) > 1 and (near := difflib.get_close_matches(topic[:100], names, n=1, cutoff=0.3)):
+        nearest = topics[near[0]]
+    return f"the nearest, at line {nearest.line}, {nearest.instead}"
 
 
 def _listed(words: Sequence[str]) -> str:
     more = f" and {len(words) - _MOST_LISTED} more" if len(words) > _MOST_LISTED else ""
-    return ", ".join(repr(word) for word in words[:_MOST_LISTED]) + more
+    return ", ".join(map(shown, words[:_MOST_LISTED])) + more
 
 
 def _tags(tags: DataTags) -> str:
-    return (
-        f"data tags {', '.join(f'{name}={value}' for name, value in tags[:_MOST_LISTED])}" if tags else "no data tags"
-    )
+    return f"data tags {_listed([f'{name}={value}' for name, value in tags])}" if tags else "no data tags"
 
 
 def _in_partitions(partitions: Sequence[str]) -> str:
-    if not partitions:
-        return ""
-    return f" in partition{'s' if len(partitions) > 1 else ''} {_listed(partitions)}"
+    return f" in partition{'s' if len(partitions) > 1 else ''} {_listed(partitions)}" if partitions else ""
 
 
 def _with_tags(data_tags: DataTags) -> str:
