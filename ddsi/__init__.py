@@ -21,6 +21,7 @@ The names below are the public face; everything else may change.
 """
 
 from .config import Config
+from .config.secure import secure
 from .dcps import (
     DataReader,
     DataWriter,
@@ -199,5 +200,6 @@ __all__ = [
     "deserialize",
     "idl",
     "key_hash",
+    "secure",
     "serialize",
 ]

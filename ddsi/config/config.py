@@ -116,6 +116,10 @@ class Config:
     vendor_id: VendorId = OUR_VENDOR_ID
     """The two octets in every message that say whose implementation this is; for tests that play another one."""
 
+    security: tuple[tuple[str, str], ...] = ()
+    """The ``dds.sec.*`` properties that ``<Security>`` stands for, name and value.  Where the participant's QoS has
+    such properties too, they must be the same."""
+
     config_warnings: tuple[str, ...] = field(default=(), compare=False)
     """What was accepted from ``DDSI_URI`` but means nothing here, a sentence with its line for each."""
 
@@ -132,10 +136,16 @@ class Config:
             _refuse("vendor_id", self.vendor_id, "two octets (bytes)")
 
     def __repr__(self) -> str:
-        """Only what differs from the defaults."""
+        """Only what differs from the defaults; of security the names, as a value may be a key or a password."""
         default = Config()
-        changed = [item.name for item in fields(self) if getattr(self, item.name) != getattr(default, item.name)]
-        return f"Config({', '.join(f'{name}={getattr(self, name)!r}' for name in changed)})"
+        changed = {
+            item.name: getattr(self, item.name)
+            for item in fields(self)
+            if getattr(self, item.name) != getattr(default, item.name)
+        }
+        if self.security:
+            changed["security"] = tuple(name for name, _ in self.security)
+        return f"Config({', '.join(f'{name}={value!r}' for name, value in changed.items())})"
 
     @property
     def announcement_period(self) -> float:

@@ -10,7 +10,17 @@ from collections.abc import Callable, Mapping
 from .config import TraceLevel
 from .units import parse_boolean, parse_duration, parse_integer, parse_memory
 
-__all__ = ["FIELDS", "LARGEST_WINS", "MULTICAST", "REFUSED", "VERBOSITIES", "Reader", "has_effect", "parse_text"]
+__all__ = [
+    "FIELDS",
+    "LARGEST_WINS",
+    "MULTICAST",
+    "REFUSED",
+    "SECURITY",
+    "VERBOSITIES",
+    "Reader",
+    "has_effect",
+    "parse_text",
+]
 
 Reader = Callable[[str], object]
 """From the text of an element to a value.  Raises ValueError with what the text should have been."""
@@ -86,6 +96,24 @@ REFUSED: Mapping[str, tuple[tuple[str, ...], str]] = {
     "SSL/Enable": (("false",), "SSL, which protects TCP, is not supported"),
 }
 
+# The property that each element stands for.  What is empty here is accepted and decided by us: where the plugins are,
+# and that optional fields are always sent.
+SECURITY: Mapping[str, str] = {
+    "Security/Authentication/IdentityCA": "dds.sec.auth.identity_ca",
+    "Security/Authentication/IdentityCertificate": "dds.sec.auth.identity_certificate",
+    "Security/Authentication/PrivateKey": "dds.sec.auth.private_key",
+    "Security/Authentication/Password": "dds.sec.auth.password",
+    "Security/Authentication/CRL": "dds.sec.auth.crl",
+    "Security/Authentication/TrustedCADirectory": "dds.sec.auth.trusted_ca_dir",
+    "Security/Authentication/IncludeOptionalFields": "",
+    "Security/Authentication/Library": "",
+    "Security/AccessControl/PermissionsCA": "dds.sec.access.permissions_ca",
+    "Security/AccessControl/Governance": "dds.sec.access.governance",
+    "Security/AccessControl/Permissions": "dds.sec.access.permissions",
+    "Security/AccessControl/Library": "",
+    "Security/Cryptographic/Library": "",
+}
+
 # `spdp` keeps announcements on multicast and moves data to unicast.
 MULTICAST: Mapping[str, bool | None] = {
     "default": None,
@@ -117,7 +145,6 @@ _TOGETHER = (
     "Discovery/Peers/Peer",
     "Discovery/Peers/Group/Peer",
     "Tracing/Verbosity",
-    "Security",
 )
 
 
@@ -136,4 +163,4 @@ def _with_all_above(paths: list[str]) -> frozenset[str]:
     return frozenset(effective)
 
 
-_EFFECTIVE = _with_all_above([*FIELDS, *REFUSED, *_TOGETHER])
+_EFFECTIVE = _with_all_above([*FIELDS, *REFUSED, *SECURITY, *_TOGETHER])

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from ddsi.structure.errors import ConfigurationError
 
 from .config import Config, TraceLevel
-from .meanings import FIELDS, LARGEST_WINS, MULTICAST, REFUSED, VERBOSITIES, has_effect, parse_text
+from .meanings import FIELDS, LARGEST_WINS, MULTICAST, REFUSED, SECURITY, VERBOSITIES, has_effect, parse_text
 from .ports import PortMapping
 from .refusal import RefusedSetting
 from .units import parse_boolean
@@ -37,6 +37,8 @@ class Settings:
     """By name or address: may it multicast?  None: it does not say."""
     peers: list[str] = field(default_factory=list)
     trace_level: TraceLevel | None = None
+    security: dict[str, str] = field(default_factory=dict, repr=False)
+    """By property."""
 
     def read(self, domain: Element, source: str) -> None:
         """Take over all that stands in this ``<Domain>``; its names must be known to be right."""
@@ -48,6 +50,7 @@ class Settings:
         ports = {name.removeprefix("ports."): values.pop(name) for name in list(values) if name.startswith("ports.")}
         values["interfaces"] = tuple(self.interfaces)
         values["peers"] = tuple(dict.fromkeys(self.peers))
+        values["security"] = tuple(self.security.items())
         if values.get("multicast") is None:
             values["multicast"] = self._multicast_of_interfaces()
         self._settle_tracing(values)
@@ -108,10 +111,9 @@ class _DomainReader:
             case "Tracing/Verbosity":
                 self._verbosity(element, word)
             case "Security":
-                raise ConfigurationError(
-                    f"{self._place(element, word)}: DDS Security comes with a later release; remove the element to "
-                    "run unprotected"
-                )
+                self._security(element, word)
+            case path if path in SECURITY:
+                self._security_property(element, word)
             case path if not has_effect(path):
                 self._settings.warnings.append(f"{self._place(element, word)} has no effect in ddsi")
             case _:
@@ -204,6 +206,19 @@ class _DomainReader:
         if text not in VERBOSITIES:
             raise ConfigurationError(f"{place} is {text!r}; it must be one of {', '.join(VERBOSITIES)}")
         self._settings.trace_level = VERBOSITIES[text]
+
+    def _security(self, element: Element, word: Word) -> None:
+        self.children(element, word)
+        if not self._settings.security:
+            raise ConfigurationError(
+                f"{self._place(element, word)} names no certificate, key or document, so nothing would be protected: "
+                "fill it, or remove it to run unprotected"
+            )
+
+    def _security_property(self, element: Element, word: Word) -> None:
+        name, text = SECURITY[word.path], self._expand(element.text, self._place(element, word))
+        if name and text:
+            self._settings.security[name] = text
 
     # --- values and places ---
 

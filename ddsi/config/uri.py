@@ -134,8 +134,6 @@ def _check_names(element: Element, word: Word, source: str) -> None:
     for attribute in element.attributes:
         if attribute.lower() not in word.attributes:
             raise ConfigurationError(f"{place} has no attribute {attribute!r}: {word.attribute_suggestion(attribute)}")
-    if word.path == "Security":  # its names are those of the package that implements it
-        return
     if element.text and word.children:
         raise ConfigurationError(f"{place} holds elements, not {element.text[:40]!r}")
     for child in element.children:

@@ -141,6 +141,22 @@ Domain @Id
         AppendToFile
         PacketCaptureFile
     Security|DDSSecurity
+        Authentication
+            Library @path @initFunction @finalizeFunction
+            IdentityCA
+            IdentityCertificate
+            PrivateKey
+            Password
+            CRL
+            TrustedCADirectory
+            IncludeOptionalFields
+        AccessControl
+            Library @path @initFunction @finalizeFunction
+            PermissionsCA
+            Governance
+            Permissions
+        Cryptographic
+            Library @path @initFunction @finalizeFunction
     Internal|Unsupported
         AccelerateRexmitBlockSize
         AckDelay

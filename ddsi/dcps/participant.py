@@ -15,6 +15,7 @@ import trio
 
 from ..config import Config
 from ..config.environment import load_config
+from ..config.secure import participant_properties
 from ..discovery.matching import MatchRefusal
 from ..engine import DataAvailable, DiscoveryChanged, Effect, LocalWriter, StatusChanged, WriterProgress
 from ..structure.builtin_entity_ids import SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER
@@ -146,14 +147,13 @@ class DomainParticipant(Parent):
                 self._pump.close()
 
     def _options(self) -> PumpOptions:
-        properties = self._qos.properties
         user_data = self._qos.user_data
         return PumpOptions(
             domain_id=self._domain_id,
             config=self._config,
             entity_name=self._qos.entity_name or "",
             user_data=user_data.value if user_data is not None else b"",
-            properties=properties,
+            properties=participant_properties(self._qos.properties, self._config),
         )
 
     # --- who is there ------------------------------------------------------------------------------------

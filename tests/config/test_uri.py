@@ -101,7 +101,7 @@ def test_all_that_can_be_said() -> None:
 def test_every_field_has_its_element() -> None:
     """A setting of Config that files cannot hold would be found out only by those who need it."""
     by_element = {name.partition(".")[0] for name, _ in FIELDS.values()}
-    by_several = {"interfaces", "multicast", "peers", "trace_level"}
+    by_several = {"interfaces", "multicast", "peers", "trace_level", "security"}
     of_tests_only = {"vendor_id", "config_warnings"}
     assert {item.name for item in dataclasses.fields(Config)} == by_element | by_several | of_tests_only
 
@@ -214,6 +214,11 @@ class TestMisspelt:
             ("<General><NetworkInterface/>", "<NetworkInterface> belongs into <General/Interfaces>"),
             ("<General><Discovery/>", "<Discovery> belongs into <Domain>"),
             (
+                "<Security><Authentication><IdentityCertificat/>",
+                "<IdentityCertificat> is not known in <Security/Authentication>: did you mean <IdentityCertificate>?",
+            ),
+            ("<Security><Authentication><Governance/>", "<Governance> belongs into <Security/AccessControl>"),
+            (
                 "<Tracing><X>",
                 "here may stand <Category>, <Verbosity>, <OutputFile>, <AppendToFile>, <PacketCaptureFile>",
             ),
@@ -290,8 +295,9 @@ class TestValues:
     @pytest.mark.parametrize(
         ("xml", "message"),
         [
-            ("<Security/>", "DDS Security comes with a later release"),
-            ("<DDSSecurity><X y='1'/>z", "DDS Security comes with a later release"),
+            ("<Security/>", "names no certificate, key or document, so nothing would be protected"),
+            ("<DDSSecurity><Cryptographic/>", "names no certificate, key or document"),
+            ("<Security><Authentication><Library path='x'/>", "names no certificate, key or document"),
             ("<SSL><Enable>true", "<SSL/Enable> is 'true': SSL, which protects TCP, is not supported; remove it"),
             ("<TCP><Enable>true", "TCP is not supported"),
             ("<General><Transport>tcp", "only udp is supported"),
