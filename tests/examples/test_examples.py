@@ -115,3 +115,14 @@ def test_lossy_link_is_the_same_each_time_and_another_by_another_seed() -> None:
     assert once == output_of(program, "0.4", "7")
     assert once != output_of(program, "0.4", "8")
     assert once[-1].startswith("written [1, 2, 3, 4, 5], received [1, 2, 3, 4, 5], ")
+
+
+def test_own_plugin_refuses_whom_the_builtin_one_admits() -> None:
+    pytest.importorskip("cryptography")
+    *met, misspelt = output_of(EXAMPLES / "05_own_plugin.py")
+    assert met == [
+        "alice and bob:     authenticated, and both hold one secret",
+        "alice and mallory: alice refuses: CN=mallory is not on our list",
+        "bob and mallory:   authenticated, and both hold one secret",
+    ]
+    assert misspelt.endswith(" is '__main__:AlowList': __main__ has no AlowList: did you mean AllowList?")

@@ -118,6 +118,17 @@ def test_the_builtin_plugin_is_the_default_and_has_other_names(
     assert [plugins.authentication, plugins.access_control, plugins.cryptographic, plugins.logging].count(made[0]) == 1
 
 
+def test_the_builtin_plugins_are_plugins() -> None:
+    pytest.importorskip("cryptography")
+    pytest.importorskip("lxml")
+    plugins = load({})
+    assert [type(plugin).__name__ for plugin in (plugins.authentication, plugins.access_control)] == [
+        "PkiDhAuthentication",
+        "PermissionsAccessControl",
+    ]
+    assert [type(plugin).__name__ for plugin in (plugins.cryptographic, plugins.logging)] == ["AesGcmGmac", "LogTopic"]
+
+
 def test_what_is_not_chosen_is_not_imported() -> None:
     """In a process of its own: a participant whose plugins are all a third party's needs no cryptographic library."""
     program = f"""
@@ -129,20 +140,37 @@ print([name for name in ("cryptography", "lxml", "ddsi_security.authentication")
     assert _output(program) == "[]\n"
 
 
-def test_a_missing_extra_is_said_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "acme_on_top.py").write_text("import cryptography.x509")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(sys.modules, "cryptography", None)
-    assert refusal({"dds.sec.auth.plugin": "acme_on_top:make"}) == (
-        "property dds.sec.auth.plugin is 'acme_on_top:make': needs the package cryptography: "
-        "pip install 'ddsi[security]'"
-    )
+def test_a_missing_extra_is_said_in_one_sentence() -> None:
+    """Of either package, and by a third party's plugin that builds upon the builtin one too."""
+    program = """
+import sys
+sys.modules[sys.argv[1]] = None
+from ddsi_security.loading import load_plugins
+from ddsi.structure.errors import ConfigurationError
+try:
+    load_plugins({sys.argv[2]: sys.argv[3]}, entropy=bytes, wall_clock=int)
+except ConfigurationError as error:
+    print(error)
+"""
+    for package, name, value in (
+        ("cryptography", "dds.sec.auth.plugin", "builtin"),
+        ("cryptography", "dds.sec.auth.plugin", "ddsi_security.authentication.pki_dh:PkiDhAuthentication"),
+        ("lxml", "dds.sec.access.plugin", "builtin"),
+    ):
+        assert _output(program, package, name, value) == (
+            f"property {name} is {value!r}: needs the package {package}: pip install 'ddsi[security]'\n"
+        )
 
 
-def _output(program: str) -> str:
+def _output(program: str, *arguments: str) -> str:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True, cwd=ROOT
+        [sys.executable, "-c", program, *arguments],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
     ).stdout
 
 
