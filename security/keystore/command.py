@@ -113,7 +113,7 @@ def _enclave(parser: argparse.ArgumentParser) -> None:
 
 
 def _check(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folders", type=Path, nargs="+", metavar="DIR", help="keystores, or folders of one identity")
+    parser.add_argument("folders", type=Path, nargs="*", metavar="DIR", help="keystores, or folders of one identity")
     parser.add_argument("--soon", type=int, default=_DEFAULT_DAYS_TO_EXPIRY, metavar="DAYS",
                         help="warn so long before something expires (default: 30)")  # fmt: skip
     parser.add_argument("--ignore", action="append", default=[], metavar="RULE", help="not this rule; repeatable")

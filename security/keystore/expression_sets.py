@@ -1,4 +1,4 @@
-"""Does one topic expression mean all that another means?  Can two mean the same topic?  For rules about rules.
+"""Does one expression mean all that another means?  Can two mean the same?  The same for domains.  For rules on rules.
 
 DDS-Security 1.1 §9.4.1.3.2.3 (fnmatch).  ``*`` and ``?`` are understood; of ``[...]`` only that it may be any one
 character.  :func:`covers` says yes only when it is sure, :func:`overlaps` says no only when it is sure, so that what
@@ -10,9 +10,10 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from ..access_control.domains import DomainRange, Domains
 from ..access_control.wildcard import matches
 
-__all__ = ["covers", "is_literal", "overlaps"]
+__all__ = ["covers", "domains_cover", "domains_overlap", "is_literal", "overlaps"]
 
 _STAR, _ANY = "*", "?"
 _TOKEN: Final = re.compile(r"\[!?\]?[^\]]*\]|.", re.DOTALL)
@@ -64,3 +65,30 @@ def overlaps(first: str, second: str) -> bool:
 
 def _may_be_same(one: str, other: str) -> bool:
     return one == other or _ANY in (one, other) or one.startswith("[") or other.startswith("[")
+
+
+# --- domains -------------------------------------------------------------------------------------------------
+
+
+def domains_cover(wide: Domains, narrow: Domains) -> bool:
+    """Is every domain that ``narrow`` includes one that ``wide`` includes?  False where it is hard to tell."""
+    if wide.tags and wide.tags != narrow.tags:
+        return False
+    return all(any(_range_covers(one, other) for one in _ranges(wide)) for other in _ranges(narrow))
+
+
+def domains_overlap(first: Domains, second: Domains) -> bool:
+    """Is there a domain that both include?  True where it is hard to tell, as with tags."""
+    return any(
+        (one.last is None or other.first <= one.last) and (other.last is None or one.first <= other.last)
+        for one in _ranges(first)
+        for other in _ranges(second)
+    )
+
+
+def _range_covers(wide: DomainRange, narrow: DomainRange) -> bool:
+    return wide.first <= narrow.first and (wide.last is None or (narrow.last is not None and narrow.last <= wide.last))
+
+
+def _ranges(domains: Domains) -> tuple[DomainRange, ...]:
+    return domains.ranges or (DomainRange(0, None),)

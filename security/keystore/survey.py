@@ -24,7 +24,7 @@ from .file_set import read_file
 from .key_pair import PrivateKey, parse_private_key
 from .keystore import ENCLAVES, Keystore
 
-__all__ = ["Enclave", "Survey", "find_enclaves", "find_keystore", "survey"]
+__all__ = ["Enclave", "Survey", "find_enclaves", "find_keystore", "key_files", "survey"]
 
 _MOST_FILES: Final = 5000
 _PUBLIC, _PRIVATE = "public", "private"
@@ -135,6 +135,11 @@ def find_enclaves(root: Path) -> list[Enclave]:
     return enclaves
 
 
+def key_files(root: Path) -> list[Path]:
+    """Private keys in ``root`` and where keystores have those of their authorities."""
+    return list(survey(root, root / _PUBLIC, root / _PRIVATE).keys)
+
+
 def _ros_enclaves(root: Path) -> Iterator[Enclave]:
     """Folders below ``enclaves`` with the names of ROS 2, or such a folder itself."""
     below = root / ENCLAVES
@@ -160,7 +165,7 @@ def _enclave(name: str, folder: Path, certificate: Path, found: Survey) -> Encla
     permissions_ca = _named(authorities, "perm") or identity_ca
     key = found.key_of(identity.public_key()) if identity else None
     mine = [path for path, kind in found.signed.items() if kind is DocumentKind.PERMISSIONS]
-    permissions = _named(mine, name) or (mine[0] if len(mine) == 1 else None)
+    permissions = _of(mine, name) or (mine[0] if len(mine) == 1 else None)
 
     def choose(standard: str, by_content: Path | None) -> Path:
         return folder / standard if (folder / standard).exists() or by_content is None else by_content
@@ -170,7 +175,7 @@ def _enclave(name: str, folder: Path, certificate: Path, found: Survey) -> Encla
         folder=folder,
         identity_ca=choose("identity_ca.cert.pem", identity_ca),
         certificate=certificate,
-        private_key=choose("key.pem", key or _named(list(found.keys), name)),
+        private_key=choose("key.pem", key or _of(list(found.keys), name)),
         permissions_ca=choose("permissions_ca.cert.pem", permissions_ca),
         governance=choose("governance.p7s", _governance(found)),
         permissions=choose("permissions.p7s", permissions),
@@ -181,6 +186,11 @@ def _governance(found: Survey) -> Path | None:
     """One called governance goes before others, such as those kept for trying."""
     governance = [path for path, kind in found.signed.items() if kind is DocumentKind.GOVERNANCE]
     return next((path for path in governance if path.stem == "governance"), next(iter(governance), None))
+
+
+def _of(paths: list[Path], name: str) -> Path | None:
+    """The file of an identity: ``alice.key``, ``alice_key.pem``, ``alice.permissions.p7s``."""
+    return next((path for path in paths if re.match(rf"{re.escape(name)}[._-]", path.name)), None)
 
 
 def _named(paths: list[Path], part: str) -> Path | None:

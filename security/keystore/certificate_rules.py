@@ -1,0 +1,179 @@
+"""Rules on certificates and keys.  DDS-Security 1.1 §9.3.1, §9.3.2.1; what vendors accept."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
+
+from .certificate import certificate_validity, is_authority, is_issued_by
+from .distinguished_name import rfc2253_text
+from .finding import Finding, Rule, Severity
+from .horizon import Horizon
+from .key_pair import PrivateKey, algorithm_text
+
+__all__ = [
+    "CERTIFICATE_UNREADABLE",
+    "KEY_UNREADABLE",
+    "RULES",
+    "check_authority",
+    "check_identity",
+    "check_key",
+    "check_shared_authority",
+]
+
+CERTIFICATE_UNREADABLE: Final = Rule("certificate-unreadable", Severity.ERROR, "no certificate in PEM can be read")
+KEY_UNREADABLE: Final = Rule("key-unreadable", Severity.ERROR, "no private key in PEM can be read")
+KEY_HAS_PASSWORD: Final = Rule("key-has-password", Severity.NOTE, "a password protects the key, so it was not tried")
+KEY_MISMATCH: Final = Rule("key-mismatch", Severity.ERROR, "the private key is not that of the certificate")
+EXPIRED: Final = Rule("certificate-expired", Severity.ERROR, "a certificate is not valid any more")
+NOT_YET_VALID: Final = Rule("certificate-not-yet-valid", Severity.ERROR, "a certificate is not valid yet")
+EXPIRES_SOON: Final = Rule("certificate-expires-soon", Severity.WARNING, "a certificate ends within --soon days")
+WRONG_CA: Final = Rule("identity-wrong-ca", Severity.ERROR, "the identity CA did not issue the identity's certificate")
+WEAK_ALGORITHM: Final = Rule("weak-algorithm", Severity.ERROR, "a key or a signature that can be forged")
+UNSUPPORTED_KEY: Final = Rule("unsupported-key", Severity.ERROR, "a key of a kind that DDS Security does not know")
+P384_KEY: Final = Rule("p384-key", Severity.WARNING, "EC P-384, which came with DDS Security 1.2")
+NOT_AUTHORITY: Final = Rule("ca-not-authority", Severity.WARNING, "a CA's certificate does not say that it is one")
+IDENTITY_IS_AUTHORITY: Final = Rule("identity-is-ca", Severity.WARNING, "an identity may issue further identities")
+SHARED_AUTHORITY: Final = Rule("shared-ca", Severity.NOTE, "one authority issues identities and signs permissions")
+SUBJECT_CHARACTERS: Final = Rule("subject-characters", Severity.WARNING, "a subject that vendors read differently")
+RULES: Final = (
+    *(CERTIFICATE_UNREADABLE, KEY_UNREADABLE, KEY_HAS_PASSWORD, KEY_MISMATCH, EXPIRED, NOT_YET_VALID, EXPIRES_SOON),
+    *(WRONG_CA, WEAK_ALGORITHM, UNSUPPORTED_KEY, P384_KEY, NOT_AUTHORITY, IDENTITY_IS_AUTHORITY, SHARED_AUTHORITY),
+    SUBJECT_CHARACTERS,
+)
+
+_LEAST_RSA_BITS: Final = 2048
+_WEAK_DIGESTS: Final = ("md5", "sha1")
+_FRAGILE: Final = frozenset(',|+="\\<>;')
+"""Cyclone DDS splits subjects at some of these, Fast DDS ignores others; a slash is common with ROS 2, and works."""
+
+Certified = tuple[Path, x509.Certificate]
+"""A certificate, and the file it is in."""
+
+
+def check_identity(identity: Certified, authority: Certified | None, horizon: Horizon) -> Iterator[Finding]:
+    """A certificate by which a participant is known."""
+    path, certificate = identity
+    yield from _check_certificate(identity, "the identity's certificate", horizon)
+    if authority and not is_issued_by(certificate, authority[1]):
+        issuer, ca = rfc2253_text(certificate.issuer), rfc2253_text(authority[1].subject)
+        text = f"it was issued by {issuer}, and the identity CA in {authority[0]} is {ca}"
+        if issuer == ca:
+            text = f"the identity CA in {authority[0]} has the name of its issuer, {ca}, but another key"
+        yield WRONG_CA.at(
+            path,
+            text,
+            remedy="bring the certificate of the CA that issued it, or issue it anew: ddsi keystore identity",
+        )
+    if is_authority(certificate):
+        yield IDENTITY_IS_AUTHORITY.at(
+            path,
+            "basicConstraints says CA:TRUE, so whoever has its key may make identities below it",
+            remedy="issue a certificate with CA:FALSE: ddsi keystore identity",
+        )
+    yield from _check_subject(path, certificate.subject)
+
+
+def check_authority(authority: Certified, what: str, horizon: Horizon) -> Iterator[Finding]:
+    """A certificate that is trusted: the identity CA's or the permissions CA's, as ``what`` says."""
+    path, certificate = authority
+    yield from _check_certificate(authority, f"the {what}'s certificate", horizon)
+    if not is_authority(certificate):
+        yield NOT_AUTHORITY.at(
+            path,
+            f"the {what}'s certificate has no basicConstraints with CA:TRUE, which some verify",
+            remedy="make it with ddsi keystore ca, or openssl req -x509 -addext basicConstraints=critical,CA:TRUE",
+        )
+
+
+def check_shared_authority(identity_ca: Certified, permissions_ca: Certified) -> Iterator[Finding]:
+    """ROS 2's tools make it so."""
+    if identity_ca[1].public_key() == permissions_ca[1].public_key():
+        yield SHARED_AUTHORITY.at(
+            permissions_ca[0],
+            "identity CA and permissions CA have the same key; stacks from before the fixes of CVE-2023-24010 to "
+            "-24012 then let every identity sign permissions for itself",
+            remedy="use a second authority for documents, or make sure that all participants are up to date",
+        )
+
+
+def check_key(path: Path, key: PrivateKey | None, certificate: x509.Certificate | None) -> Iterator[Finding]:
+    """An identity's private key; None: a password protects it."""
+    if key is None:
+        yield KEY_HAS_PASSWORD.at(
+            path,
+            "a password protects the key, so that it could not be compared with the certificate",
+            remedy="give participants the property dds.sec.auth.password",
+        )
+    elif certificate and key.public_key() != certificate.public_key():
+        yield KEY_MISMATCH.at(
+            path,
+            f"it is not the key of the certificate of {rfc2253_text(certificate.subject)}",
+            remedy="bring the key that was made with the certificate, or make both anew: ddsi keystore identity",
+        )
+
+
+def _check_certificate(one: Certified, what: str, horizon: Horizon) -> Iterator[Finding]:
+    path, certificate = one
+    validity = certificate_validity(certificate)
+    not_before, not_after = (int(end.timestamp()) * 1_000_000_000 for end in (validity.not_before, validity.not_after))
+    renew = "issue it anew: ddsi keystore identity, or ca"
+    if horizon.now > not_after:
+        yield EXPIRED.at(path, f"{what} expired at {validity.not_after:%Y-%m-%d %H:%M:%SZ}", remedy=renew)
+    elif horizon.soon > not_after:
+        days = horizon.days_until(not_after)
+        yield EXPIRES_SOON.at(path, f"{what} expires at {validity.not_after:%Y-%m-%d %H:%M:%SZ}, in {days} days",
+                              remedy=renew)  # fmt: skip
+    if horizon.now < not_before:
+        yield NOT_YET_VALID.at(
+            path,
+            f"{what} is not valid before {validity.not_before:%Y-%m-%d %H:%M:%SZ}",
+            remedy="set this machine's clock, or issue it anew",
+        )
+    yield from _check_algorithms(path, certificate, what)
+
+
+def _check_algorithms(path: Path, certificate: x509.Certificate, what: str) -> Iterator[Finding]:
+    key = certificate.public_key()
+    kind = algorithm_text(key)
+    remedy = "make it anew with EC P-256, which every vendor takes, or RSA of 2048 bits"
+    if isinstance(key, rsa.RSAPublicKey) and key.key_size < _LEAST_RSA_BITS:
+        yield WEAK_ALGORITHM.at(path, f"{what} has a key of {kind}, which can be broken", remedy=remedy)
+    elif isinstance(key, ec.EllipticCurvePublicKey) and kind == "EC P-384":
+        text = f"{what} has a key of EC P-384: Cyclone DDS and others that know DDS Security 1.1 refuse it"
+        yield P384_KEY.at(path, text, remedy="use EC P-256 where they take part")
+    elif kind not in ("EC P-256", "RSA 2048"):
+        text = f"{what} has a key of {kind}; DDS Security knows RSA 2048 and EC P-256"
+        yield UNSUPPORTED_KEY.at(path, text, remedy=remedy)
+    digest = _digest_name(certificate)
+    if digest in _WEAK_DIGESTS:
+        yield WEAK_ALGORITHM.at(path, f"{what} is signed with {digest.upper()}, which can be forged", remedy=remedy)
+
+
+def _digest_name(certificate: x509.Certificate) -> str:
+    try:
+        algorithm = certificate.signature_hash_algorithm
+    except UnsupportedAlgorithm:
+        return ""
+    return algorithm.name if algorithm else ""
+
+
+def _check_subject(path: Path, subject: x509.Name) -> Iterator[Finding]:
+    values = [str(attribute.value) for attribute in subject]
+    fragile = sorted({character for value in values for character in value if character in _FRAGILE})
+    repeated = [kind for kind, count in Counter(attribute.oid for attribute in subject).items() if count > 1]
+    remedy = "issue it for a name such as CN=alice,O=Example: one value of each kind, letters, digits, blanks, dots"
+    if fragile:
+        text = (
+            f"its subject {rfc2253_text(subject)} has {' '.join(fragile)} in a value, where Cyclone and Fast DDS differ"
+        )
+        yield SUBJECT_CHARACTERS.at(path, text, remedy=remedy)
+    elif repeated:
+        text = f"its subject {rfc2253_text(subject)} has several values of one kind, which vendors compare differently"
+        yield SUBJECT_CHARACTERS.at(path, text, remedy=remedy)
