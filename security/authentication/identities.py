@@ -63,7 +63,7 @@ class RemoteIdentityHandle(IdentityHandle):
 
     def expected(self, now: int) -> Expected:
         known = self.peer.certificate if self.peer is not None else None
-        return Expected(self.guid, self.its_challenge, known, self.local.anchors, now)
+        return Expected(self.guid, self.identity_token, self.its_challenge, known, self.local.anchors, now)
 
     def __repr__(self) -> str:
         name = self.peer.certificate.subject if self.peer else "not authenticated"

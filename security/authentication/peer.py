@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 
 from ddsi.structure.guid import Guid
 
+from ..tokens import IdentityToken
 from .adjusted_guid import subject_octets
 from .algorithms import signature_algorithm_named
 from .certificate import Certificate
 from .handshake_tokens import Credentials
 from .not_trusted import NotTrusted
-from .participant_data import guid_in_participant_data
+from .participant_data import ParticipantData
 from .trust_anchors import TrustAnchors
 
 __all__ = ["Expected", "Peer"]
@@ -38,6 +39,7 @@ class Expected:
     """
 
     guid: Guid
+    identity_token: IdentityToken
     challenge: bytes | None = field(repr=False)
     certificate: Certificate | None
     anchors: TrustAnchors
@@ -56,8 +58,11 @@ class Expected:
             raise NotTrusted(
                 f"it says to sign by {theirs.c_dsign_algo[:64]!r}, its certificate's key is {certificate.algorithm.key}"
             )
-        if guid_in_participant_data(theirs.c_pdata) != self.guid:
+        announced = ParticipantData.read(theirs.c_pdata)
+        if announced.guid != self.guid:
             raise NotTrusted("the Guid in its participant data (c.pdata) is not the one that it announces")
+        if announced.identity_token not in (None, self.identity_token):
+            raise NotTrusted("the identity token in its participant data (c.pdata) is not the one that it announces")
         owned = subject_octets(certificate.subject_der)
         if not self.guid.startswith(owned):
             raise NotTrusted(
