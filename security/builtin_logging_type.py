@@ -41,7 +41,7 @@ class LogLevel(IntEnum):
     DEBUG_LEVEL = 7
 
 
-@idl.struct(typename="DDSSecurity::Time_tV2", extensibility=idl.FINAL)
+@idl.struct(typename="DDSSecurity::Time_t", extensibility=idl.FINAL)
 class Timestamp:
     """Since 1970, UTC.  ``nanosec`` is below 1,000,000,000."""
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -140,7 +141,7 @@ class _Choice:
             raise  # it says itself which property, and what to do
         except Exception as error:
             raise self._refused(f"failed to start: {_told(error)}") from error
-        self._check_version(plugin, is_due=not hasattr(factory, "plugin_version"))
+        self._check_version(plugin, is_due=getattr(factory, "plugin_version", None) is None)
         if found := objections(plugin, self._kind.interface):
             made = f"the {type(plugin).__name__} it makes is no {self._kind.interface.__name__}"
             raise self._refused(f"{made}: {'; '.join(found)}")
@@ -164,13 +165,16 @@ class _Choice:
         else:
             reference = self._entry_point()
         module_name, _, attribute = reference.partition(":")
-        found: object = self._module(module_name)
-        for name in attribute.split("."):
-            if not hasattr(found, name):
-                raise self._refused(f"{module_name} has no {attribute}{_nearest(name, dir(found))}")
-            found = getattr(found, name)
+        if not module_name or module_name.startswith("."):
+            raise self._refused("write module:factory, with the module's whole name")
+        with self._import_errors_explained(module_name):
+            found: object = import_module(module_name)
+            for name in attribute.split("."):
+                if not hasattr(found, name):
+                    raise self._refused(f"{module_name} has no {attribute}{_nearest(name, dir(found))}")
+                found = getattr(found, name)
         if not callable(found):
-            raise self._refused(f"{attribute} is a {type(found).__name__}, which cannot be called to make a plugin")
+            raise self._refused(f"{attribute} is of type {type(found).__name__}, and nothing that makes a plugin")
         return cast(PluginFactory[object], found)
 
     def _entry_point(self) -> str:
@@ -189,20 +193,22 @@ class _Choice:
             )
         return references.pop()
 
-    def _module(self, name: str) -> object:
-        if not name or name.startswith("."):
-            raise self._refused("write module:factory, with the module's whole name")
+    @contextmanager
+    def _import_errors_explained(self, module_name: str) -> Iterator[None]:
+        """Around the import, and around getting a name out of the module, which may import more."""
         try:
-            return import_module(name)
+            yield
+        except ConfigurationError:
+            raise
         except ImportError as error:
             absent = error.name or ""
             if (package := absent.partition(".")[0]) in _EXTRA_PACKAGES:
                 raise self._refused(f"needs the package {package}: pip install 'ddsi[security]'") from error
-            if isinstance(error, ModuleNotFoundError) and f"{name}.".startswith(f"{absent}."):
+            if isinstance(error, ModuleNotFoundError) and f"{module_name}.".startswith(f"{absent}."):
                 raise self._refused(f"there is no module {absent}: install what holds it, or correct it") from error
-            raise self._refused(f"{name} cannot be imported: {_told(error)}") from error
+            raise self._refused(f"{module_name} cannot be imported: {_told(error)}") from error
         except Exception as error:
-            raise self._refused(f"{name} cannot be imported: {_told(error)}") from error
+            raise self._refused(f"{module_name} cannot be imported: {_told(error)}") from error
 
     def _refused(self, reason: str) -> ConfigurationError:
         return ConfigurationError(f"property {self._kind.property_name} is {self._value!r}: {reason}")

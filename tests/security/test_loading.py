@@ -240,6 +240,7 @@ BROKEN = {
     "misspelt.py": "import acme_that_is_absent",
     "unfinished.py": "def make(:",
     "failing_module.py": "raise RuntimeError('no licence')",
+    "lazy.py": "def __getattr__(name): import acme_that_is_absent",
 }
 
 
@@ -251,6 +252,7 @@ BROKEN = {
         ("misspelt:make", "misspelt cannot be imported: ModuleNotFoundError: No module named 'acme_that_is_absent'"),
         ("unfinished:make", "unfinished cannot be imported: SyntaxError: "),
         ("failing_module:make", "failing_module cannot be imported: RuntimeError: no licence"),
+        ("lazy:make", "lazy cannot be imported: ModuleNotFoundError: No module named 'acme_that_is_absent'"),
         (":make", "write module:factory"),
         (".relative:make", "write module:factory"),
         ("nobody.offers.this", "or write module:factory"),
@@ -258,7 +260,7 @@ BROKEN = {
         (f"{__name__}:", f"{__name__} has no "),
         (f"{__name__}:AcmeAuthenticatoin", "has no AcmeAuthenticatoin: did you mean AcmeAuthentication?"),
         (f"{__name__}:Shelf.Loging", "has no Shelf.Loging: did you mean Logging?"),
-        (f"{__name__}:not_a_factory", "not_a_factory is a int, which cannot be called to make a plugin"),
+        (f"{__name__}:not_a_factory", "not_a_factory is of type int, and nothing that makes a plugin"),
         (f"{__name__}:Version2", "is written for version 2 of the plugin interfaces, these are 1: install matching"),
         (f"{__name__}:Unversioned", "bears no plugin_version: it must say 1, if it is written for that"),
         (f"{__name__}:takes_properties_alone", "is called as factory(properties, *, entropy, wall_clock): got an "),
