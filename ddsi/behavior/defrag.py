@@ -16,14 +16,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from enum import Enum
 
 from ddsi.structure.sequence_number import MAX_SET_BITS, NumberSet
 
-__all__ = ["FRAGMENT_SILENCE", "DefragBudget", "Defragmenter", "PartialSample"]
+__all__ = ["FRAGMENT_SILENCE", "DefragBudget", "Defragmenter", "Keep", "PartialSample"]
 
 FRAGMENT_SILENCE = 0.002
 """When no fragment of a sample has come for so many seconds, the missing ones are not just late."""
 _TO_ALL = bytes(4)
+
+
+class Keep(Enum):
+    """Which unfinished samples of one writer are worth most when there is no room for all."""
+
+    LOWEST = "the lowest numbers: everybody waits for them, and a reliable writer sends the others again"
+    HIGHEST = "the highest numbers: in a best-effort stream lower ones will never be finished"
+    NEWEST = "those that began last: where anybody may have sent anything, a number says nothing"
 
 
 class PartialSample:
@@ -122,22 +131,18 @@ class DefragBudget:
 
 
 class Defragmenter:
-    """The unfinished samples of one remote writer, ``max_samples`` of them and of ``budget`` octets at most.
+    """The unfinished samples of one remote writer, ``max_samples`` of them and of ``budget`` octets at most."""
 
-    ``keeps_lowest``: when full, the highest number goes (a reliable writer will send it again, and the lowest is what
-    everybody waits for); else the lowest goes (best effort: it will never be finished).
-    """
+    __slots__ = ("_budget", "_count", "_max_samples", "_partial", "dropped", "keep", "octets")
 
-    __slots__ = ("_budget", "_count", "_max_samples", "_partial", "dropped", "keeps_lowest", "octets")
-
-    def __init__(self, budget: DefragBudget, *, max_samples: int, keeps_lowest: bool) -> None:
+    def __init__(self, budget: DefragBudget, *, max_samples: int, keep: Keep) -> None:
         self._budget = budget
         self._max_samples = max_samples
-        self.keeps_lowest = keeps_lowest
+        self.keep = keep
         self.octets = 0
         self.dropped = 0
         self._count = 0
-        # By number, then by the reader that it is for.
+        # By number, in the order in which they began; then by the reader that it is for.
         self._partial: dict[int, dict[bytes, PartialSample]] = {}
         budget.join(self)
 
@@ -161,13 +166,16 @@ class Defragmenter:
         When it :attr:`~PartialSample.is_complete` it is not held any more.
         """
         sample = self._sample_for(sequence_number, reader_id)
+        if sample is not None and (len(sample.octets) != sample_size or sample.fragment_size != fragment_size):
+            self.dropped += 1
+            if self.keep is not Keep.NEWEST:
+                return None  # a writer that contradicts itself: what came first is believed
+            self._remove(sequence_number, sample)
+            sample = None
         if sample is None:
             sample = self._start(sequence_number, reader_id, sample_size, fragment_size)
             if sample is None:
                 return None
-        elif len(sample.octets) != sample_size or sample.fragment_size != fragment_size:
-            self.dropped += 1  # a writer that contradicts itself: what came first is believed
-            return None
         sample.last_arrival = now
         sample.add(first, count, fragments)
         if sample.is_complete:
@@ -241,9 +249,15 @@ class Defragmenter:
     def _give_way(self, newcomer: int | None) -> bool:
         """Drop one sample to make room; False when the ``newcomer`` (a number of this writer) is the one to go."""
         self.dropped += 1
-        victim = max(self._partial) if self.keeps_lowest else min(self._partial)
-        if self.keeps_lowest and newcomer is not None and victim <= newcomer:
-            return False
+        match self.keep:
+            case Keep.LOWEST:
+                victim = max(self._partial)
+                if newcomer is not None and victim <= newcomer:
+                    return False
+            case Keep.HIGHEST:
+                victim = min(self._partial)
+            case Keep.NEWEST:
+                victim = next(iter(self._partial))
         self._remove_number(victim)
         return True
 

@@ -15,7 +15,7 @@ from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
-from .defrag import FRAGMENT_SILENCE, Defragmenter, PartialSample
+from .defrag import FRAGMENT_SILENCE, Defragmenter, Keep, PartialSample
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
 
@@ -51,7 +51,8 @@ class RemoteWriter:
     def readers_changed(self) -> None:
         """A reader was matched or unmatched: is anybody here who will ask for what is missing?"""
         self.is_reliable = any(proxy.is_reliable for _, proxy in self.readers)
-        self.defragmenter.keeps_lowest = self.is_reliable
+        if self.defragmenter.keep is not Keep.NEWEST:
+            self.defragmenter.keep = Keep.LOWEST if self.is_reliable else Keep.HIGHEST
 
     def forget_settled(self, delivered_sn: int = 0) -> None:
         """Drop unfinished samples that nobody waits for: below a best-effort delivery, or passed by every reliable
@@ -61,7 +62,7 @@ class RemoteWriter:
         """
         if self.is_reliable:
             self.defragmenter.notice_number(min(proxy.next_sn for _, proxy in self.readers if proxy.is_reliable))
-        else:
+        elif self.defragmenter.keep is not Keep.NEWEST:
             self.defragmenter.notice_number(delivered_sn)
 
 

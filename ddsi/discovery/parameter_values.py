@@ -24,7 +24,7 @@ from ..structure.locator import Locator, LocatorKind
 from ..structure.qos_policies import BinaryProperty, Property
 from ..structure.time import DURATION_INFINITE
 from ..structure.vendor import OPENDDS, VendorId
-from .security_parameters import to_little_endian
+from .security_parameters import to_big_endian, to_little_endian
 
 __all__ = [
     "MAX_LOCATORS",
@@ -210,13 +210,10 @@ class ParameterWriter:
             self.write(ParameterId.PROPERTY_LIST, _write_properties, (texts, octets))
 
     def security_parameters(self, parameters: Iterable[tuple[int, bytes]]) -> None:
-        """Append what the security plugins announce.
-
-        It is little-endian octets; into a big-endian list, which only the plugins themselves make, they put their own.
-        """
-        if self.parameters.little_endian:
-            for pid, value in parameters:
-                self.parameters.add(pid, value)
+        """Append what the security plugins announce; it is given as little-endian octets."""
+        little_endian = self.parameters.little_endian
+        for pid, value in parameters:
+            self.parameters.add(pid, value if little_endian else to_big_endian(pid, value))
 
 
 def _write_properties(writer: Writer, properties: tuple[list[tuple[str, str]], list[tuple[str, bytes]]]) -> None:

@@ -29,10 +29,9 @@ def encode_participant(data: DiscoveredParticipantData) -> bytes:
 
 
 def participant_parameters(data: DiscoveredParticipantData, *, little_endian: bool = True) -> ParameterList:
-    """The list inside the announcement.
+    """The list inside the announcement; in big endian as the authentication handshake sends it.
 
-    In big endian, as the authentication handshake sends it (DDS-Security 1.1 §9.3.2.5.1, c.pdata), the security
-    parameters are left out: their octets are little-endian here.
+    DDS-Security 1.1 §9.3.2.5.1 (c.pdata).
     """
     out = ParameterWriter(little_endian=little_endian)
     out.octets(_PID.PROTOCOL_VERSION, bytes(data.protocol_version))

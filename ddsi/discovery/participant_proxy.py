@@ -20,7 +20,11 @@ _MAX_HOSTS = 8
 
 
 class ParticipantProxy:
-    """``last_heard``: engine time of the last datagram from it, which is all that a lease needs."""
+    """``last_heard``: engine time of the last datagram from it, which is all that a lease needs.
+
+    ``last_manual_assertion``: when it last said that its manual writers live; ``last_protected_assertion``: on the
+    secure topic.
+    """
 
     __slots__ = (
         "_hosts",
@@ -31,7 +35,9 @@ class ParticipantProxy:
         "is_admitted",
         "last_heard",
         "last_manual_assertion",
+        "last_protected_assertion",
         "prefix",
+        "refusal",
     )
 
     def __init__(self, data: DiscoveredParticipantData, now: float) -> None:
@@ -40,7 +46,9 @@ class ParticipantProxy:
         self.prefix: GuidPrefix = data.guid.prefix
         self.last_heard = now
         self.last_manual_assertion = now
+        self.last_protected_assertion = now
         self.is_admitted = False
+        self.refusal = ""  # why security refuses it, if it does
         self.has_lost_liveliness = False
         self.endpoint_count = 0
         self._hosts: dict[bytes, None] = {}

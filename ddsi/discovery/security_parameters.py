@@ -2,6 +2,7 @@
 
 DDS-Security 1.1 §7.4.1.  ``DiscoveredParticipantData.security_parameters`` holds little-endian octets.  Every stack
 announces in little endian; for a peer that does not, the values are rewritten here, so that the plugins meet one form.
+So they are where we write a big-endian list ourselves: in the authentication handshake (§9.3.2.5.1, c.pdata).
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from ..serialization.cursor import Octets, Reader, Writer
 from ..serialization.parameter_id import ParameterId
 
-__all__ = ["to_little_endian"]
+__all__ = ["to_big_endian", "to_little_endian"]
 
 _MAX_ELEMENTS = 256
 """Properties or tags in one value."""
@@ -18,14 +19,20 @@ _DATA_HOLDERS = (ParameterId.IDENTITY_TOKEN, ParameterId.PERMISSIONS_TOKEN, Para
 
 
 def to_little_endian(pid: int, value: Octets, *, little_endian: bool) -> bytes:
-    """The value's octets in little endian; a big-endian value that does not parse is malformed.
+    """The value's octets in little endian; a big-endian value that does not parse is malformed."""
+    return bytes(value) if little_endian else _swapped(pid, value, to_little_endian=True)
 
-    Three shapes occur: DataHolder (string, properties of text, properties of octets), a sequence of tags
+
+def to_big_endian(pid: int, value: Octets) -> bytes:
+    """A little-endian value's octets in big endian; one that does not parse is malformed."""
+    return _swapped(pid, value, to_little_endian=False)
+
+
+def _swapped(pid: int, value: Octets, *, to_little_endian: bool) -> bytes:
+    """Three shapes occur: DataHolder (string, properties of text, properties of octets), a sequence of tags
     (string, string), and uint32s.
     """
-    if little_endian:
-        return bytes(value)
-    reader, writer = Reader(value, little_endian=False), Writer(little_endian=True)
+    reader, writer = Reader(value, little_endian=not to_little_endian), Writer(little_endian=to_little_endian)
     if pid in _DATA_HOLDERS:
         writer.string(reader.string())
         _swap_texts(reader, writer)

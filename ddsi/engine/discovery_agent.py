@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..behavior.stateless_writer import StatelessWriter
-from ..discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_QOS, BUILTIN_TOPICS, BuiltinTopic
+from ..discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS
 from ..discovery.parameters import (
     decode_key,
     decode_participant,
@@ -21,13 +21,14 @@ from ..discovery.parameters import (
     encode_participant,
     encode_reader,
     encode_writer,
+    participant_parameters,
 )
 from ..discovery.participant_proxy import ParticipantProxy
 from ..discovery.spdp import SpdpAnnouncer
 from ..messages.data import Data
 from ..serialization.parameter_id import ParameterId
 from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
-from ..spi import PENDING, Refused
+from ..spi import Announcement
 from ..structure import builtin_entity_ids as ids
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.discovered import (
@@ -39,10 +40,10 @@ from ..structure.discovered import (
 from ..structure.errors import MalformedMessage
 from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
-from ..structure.status import SecurityRefused
 from ..trace.reasons import DropReason, LossReason
 from .eviction import Eviction
 from .inbound import Incoming
+from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -58,12 +59,9 @@ class DiscoveryAgent:
 
     def __init__(self, engine: Participant, announce_to: tuple[Locator, ...], data: DiscoveredParticipantData) -> None:
         self._engine = engine
-        announcement = engine.hooks.announcement()
-        self.data = replace(
-            data,
-            builtin_endpoints=ANNOUNCED_ENDPOINTS | announcement.builtin_endpoints,
-            security_parameters=announcement.parameters,
-        )
+        self._announcement = Announcement()
+        self.data = data
+        self._prepare(data)
         self._spdp_writer = StatelessWriter(Guid.of(engine.guid.prefix, ids.SPDP_WRITER))
         self._announcer = SpdpAnnouncer(announce_to, engine.config.announcement_period, engine.random.random)
         self._eviction = Eviction(engine)
@@ -73,10 +71,29 @@ class DiscoveryAgent:
 
     # --- ourselves ---------------------------------------------------------------------------------------
 
+    def _prepare(self, data: DiscoveredParticipantData) -> None:
+        """Make ``data`` what we announce, with what security adds to it."""
+        hooks = self._engine.hooks
+        announcement = self._announcement = hooks.announcement()
+        self.data = replace(
+            data,
+            builtin_endpoints=ANNOUNCED_ENDPOINTS | announcement.builtin_endpoints,
+            security_parameters=announcement.parameters,
+        )
+        hooks.announced(participant_parameters(self.data, little_endian=False).encode())
+
     def start(self, now: float) -> None:
-        self._spdp_writer.new_change(ChangeKind.ALIVE, encode_participant(self.data), self._engine.wall_ticks())
+        self._write_spdp(now)
         self._announcer.start(now)
         self._arm()
+
+    def _write_spdp(self, now: float) -> None:
+        """What SPDP says from now on: in clear again and again; to those who are authenticated once, and reliably."""
+        self._spdp_writer.new_change(ChangeKind.ALIVE, encode_participant(self.data), self._engine.wall_ticks())
+        if self._engine.builtin.writer(ids.SPDP_SECURE_WRITER) is not None:
+            parameters = self.data.security_parameters + self._announcement.protected_parameters
+            payload = encode_participant(replace(self.data, security_parameters=parameters))
+            self._engine.write_builtin(ids.SPDP_SECURE_WRITER, ChangeKind.ALIVE, payload, self._engine.guid, now)
 
     def announce_due(self, now: float) -> None:
         self._send_spdp(tuple(dict.fromkeys([*self._announcer.due_destinations(now), *self._unicast_only()])))
@@ -84,23 +101,19 @@ class DiscoveryAgent:
 
     def announce_change(self, data: DiscoveredParticipantData, now: float) -> None:
         """What we announce of ourselves (user data, locators) is now this."""
-        self.data = replace(
-            data, builtin_endpoints=self.data.builtin_endpoints, security_parameters=self.data.security_parameters
-        )
-        self._spdp_writer.new_change(ChangeKind.ALIVE, encode_participant(self.data), self._engine.wall_ticks())
+        self._prepare(data)
+        self._write_spdp(now)
         self._announcer.announce_soon(now)
         self._send_spdp(tuple(locator for proxy in self._engine.participants.values() for locator in proxy.metatraffic))
         self._arm()
 
-    def say_goodbye(self) -> None:
+    def say_goodbye(self, now: float) -> None:
         """Dispose ourselves towards everybody; RTPS 2.5 §8.5.3.2.2.  Lost goodbyes are what leases are for."""
-        guid = self._engine.guid
-        change = self._spdp_writer.new_change(
-            ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED,
-            encode_key(guid, ParameterId.PARTICIPANT_GUID),
-            self._engine.wall_ticks(),
-            key_hash=guid,
-        )
+        guid, kind = self._engine.guid, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED
+        payload = encode_key(guid, ParameterId.PARTICIPANT_GUID)
+        if self._engine.builtin.writer(ids.SPDP_SECURE_WRITER) is not None:
+            self._engine.write_builtin(ids.SPDP_SECURE_WRITER, kind, payload, guid, now)
+        change = self._spdp_writer.new_change(kind, payload, self._engine.wall_ticks(), key_hash=guid)
         known = [locator for proxy in self._engine.participants.values() for locator in proxy.metatraffic]
         destinations = tuple(dict.fromkeys([*self._announcer.destinations, *known]))
         self._send_spdp(destinations, change)
@@ -161,6 +174,34 @@ class DiscoveryAgent:
             data = replace(data, metatraffic_unicast=(incoming.source,))
         self._participant_announced(incoming, data)
 
+    def receive_secure_spdp(self, change: CacheChange, now: float) -> None:
+        """What an authenticated participant says of itself.  DDS-Security 1.1 §7.4.1.6 (DCPSParticipantsSecure)."""
+        proxy = self._engine.participants.get(change.writer_guid.prefix)
+        if proxy is None:
+            return
+        try:
+            if change.kind is not ChangeKind.ALIVE:
+                guid = decode_key(change.payload, ParameterId.PARTICIPANT_GUID, key_hash=change.key_hash)
+                if guid == proxy.guid:
+                    self.participant_lost(guid, LossReason.GOODBYE, now)
+                return
+            data = decode_participant(
+                change.payload,
+                source_prefix=proxy.prefix,
+                vendor_id=proxy.vendor_id,
+                protocol_version=proxy.data.protocol_version,
+            )
+        except MalformedMessage as error:
+            self._engine.dropped_discovery(change, str(error))
+            return
+        if not data.metatraffic_unicast and not data.default_unicast:
+            data = replace(
+                data,
+                metatraffic_unicast=proxy.data.metatraffic_unicast,
+                default_unicast=proxy.data.default_unicast,
+            )
+        self._participant_announced_again(proxy, data, now)
+
     def _participant_announced(self, incoming: Incoming, data: DiscoveredParticipantData) -> None:
         engine = self._engine
         if data.guid.prefix == engine.guid.prefix:  # by way of an INFO_SRC
@@ -190,63 +231,23 @@ class DiscoveryAgent:
         greeting = proxy.metatraffic or _first_unicast(data)
         self._announcer.participant_found(proxy.metatraffic)
         self._send_spdp(greeting)
-        admission = engine.hooks.remote_participant(data, now)
-        if isinstance(admission, Refused):
-            engine.status(engine.guid, SecurityRefused(remote=data.guid, reason=admission.reason))
-        elif admission is not PENDING:
-            self.participant_admitted(proxy, now)
+        engine.admission.found(proxy, now)
         engine.discovery_changed()
         self._arm()
-
-    def participant_admitted(self, proxy: ParticipantProxy, now: float) -> None:
-        """Security has nothing against it: match the builtin endpoints, by which everything else is learnt."""
-        if proxy.is_admitted:
-            return
-        proxy.is_admitted = True
-        for topic in BUILTIN_TOPICS:
-            if topic.detector in proxy.data.builtin_endpoints:
-                self._match_builtin_reader(topic, proxy, now)
-            if topic.announcer in proxy.data.builtin_endpoints:
-                self._match_builtin_writer(topic, proxy, now)
-
-    def _match_builtin_reader(self, topic: BuiltinTopic, proxy: ParticipantProxy, now: float) -> None:
-        engine = self._engine
-        writer = engine.local_writers[Guid.of(engine.guid.prefix, topic.writer_id)]
-        data = DiscoveredReaderData(
-            guid=Guid.of(proxy.prefix, topic.reader_id),
-            topic_name=topic.name,
-            type_name=topic.name,
-            qos=BUILTIN_QOS,
-            vendor_id=proxy.vendor_id,
-        )
-        transmissions = writer.behavior.matched_reader_add(data, proxy.metatraffic, now)
-        writer.receivers = tuple(writer.behavior.readers)
-        engine.writer_answers(writer, transmissions)
-
-    def _match_builtin_writer(self, topic: BuiltinTopic, proxy: ParticipantProxy, now: float) -> None:
-        engine = self._engine
-        reader = engine.local_readers[Guid.of(engine.guid.prefix, topic.reader_id)]
-        data = DiscoveredWriterData(
-            guid=Guid.of(proxy.prefix, topic.writer_id),
-            topic_name=topic.name,
-            type_name=topic.name,
-            qos=BUILTIN_QOS,
-            vendor_id=proxy.vendor_id,
-        )
-        engine.matchmaker.attach_writer(reader, data, proxy, proxy.metatraffic, now)
 
     def _participant_announced_again(
         self, proxy: ParticipantProxy, data: DiscoveredParticipantData, now: float
     ) -> None:
         engine = self._engine
         if data == proxy.data:
+            if proxy.refusal:
+                engine.admission.announced_again(proxy, now)
             return
         before, proxy.data = proxy.data, data
         engine.alarms.lease(proxy)
         engine.recorder.participant(data, is_new=False)
-        admission = engine.hooks.remote_participant_changed(data, now)
-        if isinstance(admission, Refused):
-            self.participant_lost(data.guid, LossReason.REJECTED_BY_SECURITY, now, admission.reason)
+        engine.admission.announced_again(proxy, now)
+        if proxy.prefix not in engine.participants:
             return
         if (before.metatraffic_unicast, before.default_unicast) != (data.metatraffic_unicast, data.default_unicast):
             engine.host_heard(proxy, now)
@@ -262,13 +263,7 @@ class DiscoveryAgent:
             self._writer_lost(writer_data.guid, LossReason.PARTICIPANT_LOST, now)
         for reader_data in engine.known_readers.of_participant(proxy.prefix):
             self._reader_lost(reader_data.guid, LossReason.PARTICIPANT_LOST, now)
-        for topic in BUILTIN_TOPICS:
-            writer = engine.local_writers[Guid.of(engine.guid.prefix, topic.writer_id)]
-            writer.behavior.matched_reader_remove(Guid.of(proxy.prefix, topic.reader_id), now)
-            writer.receivers = tuple(writer.behavior.readers)
-            engine.writer_answers(writer, writer.behavior.unsent_changes(now))  # the window may have waited for it
-            reader = engine.local_readers[Guid.of(engine.guid.prefix, topic.reader_id)]
-            engine.matchmaker.detach_writer(reader, Guid.of(proxy.prefix, topic.writer_id), now)
+        engine.builtin.participant_lost(proxy, now)
         del engine.participants[proxy.prefix]
         engine.alarms.no_lease(proxy)
         engine.hooks.remote_participant_lost(proxy.guid)
@@ -319,17 +314,14 @@ class DiscoveryAgent:
 
     # --- our endpoints -----------------------------------------------------------------------------------
 
-    def announce_writer(self, data: DiscoveredWriterData, now: float) -> None:
-        self._announce(ids.SEDP_PUBLICATIONS_WRITER, data.guid, encode_writer(data), now)
+    def announce_writer(self, writer: LocalWriter, now: float) -> None:
+        self._announce(_sedp_writer(writer), writer.guid, encode_writer(writer.data), now)
 
-    def announce_reader(self, data: DiscoveredReaderData, now: float) -> None:
-        self._announce(ids.SEDP_SUBSCRIPTIONS_WRITER, data.guid, encode_reader(data), now)
+    def announce_reader(self, reader: LocalReader, now: float) -> None:
+        self._announce(_sedp_writer(reader), reader.guid, encode_reader(reader.data), now)
 
-    def announce_writer_gone(self, guid: Guid, now: float) -> None:
-        self._announce_gone(ids.SEDP_PUBLICATIONS_WRITER, guid, now)
-
-    def announce_reader_gone(self, guid: Guid, now: float) -> None:
-        self._announce_gone(ids.SEDP_SUBSCRIPTIONS_WRITER, guid, now)
+    def announce_gone(self, endpoint: LocalWriter | LocalReader, now: float) -> None:
+        self._announce_gone(_sedp_writer(endpoint), endpoint.guid, now)
 
     def _announce(self, writer_id: EntityId, guid: Guid, payload: bytes, now: float) -> None:
         self._prune_farewells(now)
@@ -360,38 +352,42 @@ class DiscoveryAgent:
 
     # --- their endpoints ---------------------------------------------------------------------------------
 
-    def receive_publication(self, change: CacheChange, now: float) -> None:
-        """DiscoveredWriterData on the builtin topic DCPSPublication, or its end."""
+    def receive_publication(self, change: CacheChange, now: float, *, is_secure: bool) -> None:
+        """DiscoveredWriterData on the builtin topic DCPSPublication, or DCPSPublicationsSecure; or its end."""
         try:
             if change.kind is not ChangeKind.ALIVE:
                 guid = decode_key(change.payload, ParameterId.ENDPOINT_GUID, key_hash=change.key_hash)
-                if guid.prefix == change.writer_guid.prefix:
+                known_writer = self._engine.known_writers.get(guid)
+                if known_writer is not None and self._belongs_here(change, known_writer, is_secure=is_secure):
                     self._writer_lost(guid, LossReason.GOODBYE, now)
                 return
             data = decode_writer(change.payload, self._vendor_of(change))
         except MalformedMessage as error:
             self._engine.dropped_discovery(change, str(error))
             return
-        if self._may_enter(change, data.guid, now, is_known=self._engine.known_writers.get(data.guid) is not None):
+        is_known = self._engine.known_writers.get(data.guid) is not None
+        if self._belongs_here(change, data, is_secure=is_secure) and self._may_enter(data.guid, now, is_known=is_known):
             before = self._engine.known_writers.put(data)
             self._note_endpoint(data, before, now)
             if before is not None and before.topic_name != data.topic_name:
                 self._engine.matchmaker.remote_writer_gone(before, LossReason.QOS_CHANGED, now)
             self._engine.matchmaker.remote_writer_appeared(data, now)
 
-    def receive_subscription(self, change: CacheChange, now: float) -> None:
-        """DiscoveredReaderData on the builtin topic DCPSSubscription, or its end."""
+    def receive_subscription(self, change: CacheChange, now: float, *, is_secure: bool) -> None:
+        """DiscoveredReaderData on the builtin topic DCPSSubscription, or DCPSSubscriptionsSecure; or its end."""
         try:
             if change.kind is not ChangeKind.ALIVE:
                 guid = decode_key(change.payload, ParameterId.ENDPOINT_GUID, key_hash=change.key_hash)
-                if guid.prefix == change.writer_guid.prefix:
+                known_reader = self._engine.known_readers.get(guid)
+                if known_reader is not None and self._belongs_here(change, known_reader, is_secure=is_secure):
                     self._reader_lost(guid, LossReason.GOODBYE, now)
                 return
             data = decode_reader(change.payload, self._vendor_of(change))
         except MalformedMessage as error:
             self._engine.dropped_discovery(change, str(error))
             return
-        if self._may_enter(change, data.guid, now, is_known=self._engine.known_readers.get(data.guid) is not None):
+        is_known = self._engine.known_readers.get(data.guid) is not None
+        if self._belongs_here(change, data, is_secure=is_secure) and self._may_enter(data.guid, now, is_known=is_known):
             before = self._engine.known_readers.put(data)
             self._note_endpoint(data, before, now)
             if before is not None and before.topic_name != data.topic_name:
@@ -402,12 +398,23 @@ class DiscoveryAgent:
         proxy = self._engine.participants.get(change.writer_guid.prefix)
         return proxy.vendor_id if proxy is not None else b"\0\0"
 
-    def _may_enter(self, change: CacheChange, guid: Guid, now: float, *, is_known: bool) -> bool:
-        """A participant announces its own endpoints only, and all of them together have a bound."""
+    def _belongs_here(
+        self, change: CacheChange, data: DiscoveredWriterData | DiscoveredReaderData, *, is_secure: bool
+    ) -> bool:
+        """A participant speaks of its own endpoints only, and of each on the topic that governance names for it."""
         engine = self._engine
-        if guid.prefix != change.writer_guid.prefix:
-            engine.dropped_discovery(change, f"announces {guid}, which is not its own")
+        if data.guid.prefix != change.writer_guid.prefix:
+            engine.dropped_discovery(change, f"speaks of {data.guid}, which is not its own")
             return False
+        if not engine.hooks.admits_announcement(data, is_secure=is_secure):
+            reason = DropReason.REJECTED_BY_SECURITY if is_secure else DropReason.CLEAR_TEXT
+            engine.dropped(reason, None, f"{data.guid} is announced on the {'secure' if is_secure else 'plain'} topic")
+            return False
+        return True
+
+    def _may_enter(self, guid: Guid, now: float, *, is_known: bool) -> bool:
+        """All endpoints together have a bound."""
+        engine = self._engine
         if guid in self._ignored:
             engine.dropped(DropReason.IGNORED, None, str(guid))
             return False
@@ -446,6 +453,14 @@ class DiscoveryAgent:
             proxy.endpoint_count -= 1
         engine.recorder.endpoint_lost(guid, reason)
         engine.discovery_changed()
+
+
+def _sedp_writer(endpoint: LocalWriter | LocalReader) -> EntityId:
+    """Which of our builtin writers announces it: one alone.  DDS-Security 1.1 §7.4.1.7, §7.4.1.8."""
+    is_secure = endpoint.protection.discovery_protected
+    if isinstance(endpoint, LocalWriter):
+        return ids.SEDP_PUBLICATIONS_SECURE_WRITER if is_secure else ids.SEDP_PUBLICATIONS_WRITER
+    return ids.SEDP_SUBSCRIPTIONS_SECURE_WRITER if is_secure else ids.SEDP_SUBSCRIPTIONS_WRITER
 
 
 def _first_unicast(data: DiscoveredParticipantData) -> tuple[Locator, ...]:

@@ -14,7 +14,7 @@ from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.writer_proxy import WriterProxy
 from ..discovery.participant_message import ParticipantMessageData
 from ..discovery.participant_proxy import ParticipantProxy
-from ..structure.builtin_entity_ids import PARTICIPANT_MESSAGE_WRITER
+from ..structure.builtin_entity_ids import PARTICIPANT_MESSAGE_SECURE_WRITER, PARTICIPANT_MESSAGE_WRITER
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.discovered import DiscoveredWriterData
 from ..structure.errors import MalformedMessage
@@ -67,11 +67,11 @@ class Liveliness:
         return shortest * 0.8 if shortest < 10 else shortest - 2
 
     def assert_automatic(self, now: float) -> None:
-        self._send(AUTOMATIC_KIND, now)
+        self._send(AUTOMATIC_KIND, Automatic, now)
 
     def assert_participant(self, now: float) -> None:
         """The application says that its manual-by-participant writers are alive."""
-        self._send(MANUAL_BY_PARTICIPANT_KIND, now)
+        self._send(MANUAL_BY_PARTICIPANT_KIND, ManualByParticipant, now)
         for writer in self._engine.user_writers():
             self._renew(writer, now, ManualByParticipant)
 
@@ -113,14 +113,22 @@ class Liveliness:
             reader = self._engine.local_readers[guid]
             self._tell(reader, reader.behavior.writers[writer.guid], now, alive=alive)
 
-    def _send(self, kind: bytes, now: float) -> None:
+    def _send(self, kind: bytes, policy: type, now: float) -> None:
+        """On the secure topic for those whose liveliness is protected, on the plain one for all others."""
         message = ParticipantMessageData(self._engine.guid.prefix, kind, b"\0")
-        self._engine.write_builtin(PARTICIPANT_MESSAGE_WRITER, ChangeKind.ALIVE, message.encode(), message.key, now)
+        writers = [writer for writer in self._engine.user_writers() if isinstance(writer.data.qos.liveliness, policy)]
+        for is_protected in sorted({writer.protection.liveliness_protected for writer in writers} or {False}):
+            writer_id = PARTICIPANT_MESSAGE_SECURE_WRITER if is_protected else PARTICIPANT_MESSAGE_WRITER
+            self._engine.write_builtin(writer_id, ChangeKind.ALIVE, message.encode(), message.key, now)
 
     # --- others' writers ---------------------------------------------------------------------------------
 
-    def receive_participant_message(self, change: CacheChange, now: float) -> None:
-        """An assertion of another participant.  RTPS 2.5 §8.4.13.5 (ParticipantMessageData)."""
+    def receive_participant_message(self, change: CacheChange, now: float, *, is_secure: bool) -> None:
+        """An assertion of another participant.  RTPS 2.5 §8.4.13.5 (ParticipantMessageData).
+
+        On the secure topic it serves all of its writers; on the plain one only those whose liveliness is not
+        protected.  Automatic writers live as long as anything is heard of their participant, however it came.
+        """
         if change.kind is not ChangeKind.ALIVE:
             return
         try:
@@ -133,6 +141,8 @@ class Liveliness:
             return
         if message.kind == MANUAL_BY_PARTICIPANT_KIND:
             participant.last_manual_assertion = now
+            if is_secure:
+                participant.last_protected_assertion = now
             self._revive(participant, ManualByParticipant, now)
 
     def remote_writer_matched(self, data: DiscoveredWriterData, now: float) -> None:
@@ -175,7 +185,12 @@ class Liveliness:
         if isinstance(policy, Automatic):
             return participant.last_heard
         if isinstance(policy, ManualByParticipant):
-            return max(participant.last_manual_assertion, self._asserted.get(remote.guid, 0.0))
+            is_protected = any(
+                self._engine.local_readers[behavior.guid].protection.liveliness_protected
+                for behavior, _ in remote.readers
+            )
+            said = participant.last_protected_assertion if is_protected else participant.last_manual_assertion
+            return max(said, self._asserted.get(remote.guid, 0.0))
         return self._asserted.get(remote.guid, 0.0)
 
     def revive(self, participant: ParticipantProxy, now: float) -> None:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..behavior.defrag import Defragmenter
+from ..behavior.defrag import Defragmenter, Keep
 from ..behavior.stateful_reader import RemoteWriter
+from ..behavior.stateless_reader import StatelessReader
 from ..discovery.matching import MatchRefusal, RefusalKind, judge
 from ..discovery.participant_proxy import ParticipantProxy
 from ..spi import PENDING, Admission, Refused
@@ -174,7 +175,7 @@ class Matchmaker:
         engine = self._engine
         participant = engine.participants[data.guid[:12]]
         transmissions = writer.behavior.matched_reader_add(data, participant.user_traffic(data.unicast), now)
-        writer.receivers = tuple(writer.behavior.readers)
+        engine.receivers_changed(writer)
         self._note_matched(writer.guid, data.guid, data.topic_name)
         engine.status(writer.guid, writer.match_changed(data.guid, 1))
         engine.writer_answers(writer, transmissions)
@@ -200,10 +201,11 @@ class Matchmaker:
         engine = self._engine
         remote = engine.remote_writers.get(data.guid)
         if remote is None:
+            is_stateless = isinstance(reader.behavior, StatelessReader)
             defragmenter = Defragmenter(
-                engine.defrag_budget,
+                engine.stateless_defrag_budget if is_stateless else engine.defrag_budget,
                 max_samples=engine.config.max_reorder_samples,
-                keeps_lowest=data.qos.is_reliable,
+                keep=Keep.NEWEST if is_stateless else Keep.LOWEST,
             )
             remote = engine.remote_writers[data.guid] = RemoteWriter(data, defragmenter, participant)
         proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=reader.uses_filter)
@@ -227,7 +229,7 @@ class Matchmaker:
 
     def _unmatch_reader(self, writer: LocalWriter, guid: Guid, reason: LossReason, now: float) -> None:
         writer.behavior.matched_reader_remove(guid, now)
-        writer.receivers = tuple(writer.behavior.readers)
+        self._engine.receivers_changed(writer)
         self._engine.hooks.unmatch(writer.guid, guid)
         self._engine.recorder.unmatched(writer.guid, guid, writer.data.topic_name, reason)
         self._engine.status(writer.guid, writer.match_changed(guid, -1))

@@ -16,6 +16,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, TypeVar
 
@@ -27,24 +28,34 @@ from ..behavior.stateful_writer import StatefulWriter
 from ..behavior.transmissions import WriterTransmission
 from ..behavior.writer_proxy import WriterProxy
 from ..config import Config
-from ..discovery.builtin_endpoints import BUILTIN_QOS, BUILTIN_TOPICS
 from ..discovery.endpoint_registry import EndpointRegistry
 from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.header import Header
-from ..spi import PLAINTEXT, Decided, LocalParticipant, Octets, Refused, SecurityHooks, SendMessage
+from ..spi import (
+    PLAINTEXT,
+    Admission,
+    Decided,
+    HookEffect,
+    LocalParticipant,
+    Octets,
+    Revoked,
+    SecurityHooks,
+    SendMessage,
+)
 from ..spi import Compute as HookCompute
-from ..structure import builtin_entity_ids as ids
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import BinaryProperty, Properties, Property
-from ..structure.status import SecurityRefused, Status
+from ..structure.status import SecurityRevoked, Status
 from ..structure.time import ticks_from_nanoseconds
 from ..structure.vendor import PROTOCOL_VERSION
-from ..trace.reasons import DropReason, LossReason, SampleLossReason
+from ..trace.reasons import DropReason, LossReason, SampleLossReason, SecurityStep
+from .admission import AdmissionDesk
 from .alarms import Alarms
+from .builtin_topics import BuiltinTopics
 from .discovery_agent import DiscoveryAgent
 from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
 from .inbound import Inbound
@@ -67,6 +78,7 @@ _LOSS_TEXT = {
 _FLUSH_AFTER_S = 0.001
 _LINGER_S = 1.0
 _REORDER_MAX_OCTETS = 64 << 20
+_STATELESS_DEFRAG_OCTETS = 4 << 20  # what strangers may begin and never finish; a handshake message has some thousands
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,20 +100,6 @@ class ParticipantSetup:
     entity_name: str = ""
     user_data: bytes = b""
     properties: Properties = field(default_factory=dict)
-
-
-class _BuiltinInbox:
-    """A ChangeSink for a builtin topic: changes wait here until the datagram has been read to its end."""
-
-    __slots__ = ("_reader_id", "_waiting")
-
-    def __init__(self, reader_id: EntityId, waiting: list[tuple[EntityId, CacheChange]]) -> None:
-        self._reader_id = reader_id
-        self._waiting = waiting
-
-    def add(self, change: CacheChange, now: float) -> bool:
-        self._waiting.append((self._reader_id, change))
-        return True
 
 
 class Participant:
@@ -136,7 +134,6 @@ class Participant:
         self.recorder = Recorder(self, trace)
         self.alarms = Alarms(self)
         self._effects: list[Effect] = []
-        self._waiting: list[tuple[EntityId, CacheChange]] = []
         self._flush_armed = False
         self._hooks_deadline = math.inf
         self._next_entity_key = 1
@@ -152,6 +149,7 @@ class Participant:
         self.remote_writers: dict[bytes, RemoteWriter] = {}
         self.closing: set[Guid] = set()
         self.defrag_budget = DefragBudget(setup.config.max_defrag_octets)
+        self.stateless_defrag_budget = DefragBudget(_STATELESS_DEFRAG_OCTETS)
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
         self._max_message_octets = setup.max_message_octets
         emit = self._emit_recorded if self.recorder.is_on else self._effects.append
@@ -159,8 +157,10 @@ class Participant:
         self.inbound = Inbound(self)
         self.matchmaker = Matchmaker(self)
         self.liveliness = Liveliness(self)
+        self.admission = AdmissionDesk(self)
         self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
-        self._create_builtin_endpoints()
+        self.builtin = BuiltinTopics(self)
+        self.builtin.create(self.discovery.data.builtin_endpoints)
 
     # --- the four calls ----------------------------------------------------------------------------------
 
@@ -178,16 +178,16 @@ class Participant:
         if self.recorder.is_on:
             self.recorder.received(source, octets)
         self.inbound.receive(octets, source, now)
-        if self._waiting:
-            self._process_builtin_changes(now)
+        if self.builtin.waiting:
+            self.builtin.process_waiting(now)
 
     def handle_timeout(self, now: float) -> None:
         """Run every timer that is due."""
         self.now = now
         if not self._is_closed:
             self.alarms.run_due(now)
-        if self._waiting:
-            self._process_builtin_changes(now)
+        if self.builtin.waiting:
+            self.builtin.process_waiting(now)
 
     def next_deadline(self) -> float:
         """When :meth:`handle_timeout` is wanted at the latest, in engine seconds; ``math.inf`` for never."""
@@ -196,7 +196,7 @@ class Participant:
     def drain_effects(self) -> list[Effect]:
         """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
         self.flush()
-        self._collect_hook_effects()
+        self._act_on_hook_effects()
         if not self._effects:
             return []
         effects = list(self._effects)
@@ -248,11 +248,11 @@ class Participant:
         )  # fmt: skip
         protection = self.hooks.local_writer(data)
         data = replace(data, security_parameters=protection.parameters)
-        writer = self._add_writer(data, filters=filters)
+        writer = self.add_writer(data, filters=filters)
         writer.protection = protection
         self._writers_by_topic.setdefault(topic_name, {})[writer.guid] = writer
         self.recorder.endpoint_created(data)
-        self.discovery.announce_writer(data, now)
+        self.discovery.announce_writer(writer, now)
         self.liveliness.writer_added(writer, now)
         self.matchmaker.writer_appeared(writer, now)
         return writer
@@ -290,13 +290,13 @@ class Participant:
             on_news=lambda: self._effects.append(DataAvailable(guid)),
             on_rejected=lambda reason: self._sample_rejected(guid, reason),
         )
-        reader = self._add_reader(data, history, keys)
+        reader = self.add_reader(data, history, keys)
         reader.behavior.history = self.recorder.delivering(guid, history)
         reader.protection = protection
         reader.uses_filter = uses_filter
         self._readers_by_topic.setdefault(topic_name, {})[guid] = reader
         self.recorder.endpoint_created(data)
-        self.discovery.announce_reader(data, now)
+        self.discovery.announce_reader(reader, now)
         self.matchmaker.reader_appeared(reader, now)
         return reader
 
@@ -316,7 +316,7 @@ class Participant:
     def _finish_writer(self, writer: LocalWriter, now: float) -> None:
         self.matchmaker.writer_gone(writer, now)
         self.hooks.local_endpoint_deleted(writer.guid)
-        self.discovery.announce_writer_gone(writer.guid, now)
+        self.discovery.announce_gone(writer, now)
         self.closing.discard(writer.guid)
         del self.local_writers[writer.guid]
         _remove_from_topic(self._writers_by_topic, writer.data.topic_name, writer.guid)
@@ -334,7 +334,7 @@ class Participant:
             return
         self.matchmaker.reader_gone(reader, now)
         self.hooks.local_endpoint_deleted(reader.guid)
-        self.discovery.announce_reader_gone(reader.guid, now)
+        self.discovery.announce_gone(reader, now)
         del self.local_readers[reader.guid]
         _remove_from_topic(self._readers_by_topic, reader.data.topic_name, reader.guid)
         self.recorder.endpoint_closed(reader.guid)
@@ -349,7 +349,7 @@ class Participant:
         for reader in list(self.user_readers()):
             self.delete_reader(reader, now)
         self.outbound.flush()
-        self.discovery.say_goodbye()
+        self.discovery.say_goodbye(now)
         self._is_closed = True
         self.recorder.closed()
 
@@ -461,6 +461,10 @@ class Participant:
 
     # --- what the parts of the engine tell each other ------------------------------------------------------
 
+    def receivers_changed(self, writer: LocalWriter) -> None:
+        """A remote reader was matched with the writer, or is no more."""
+        writer.receivers = tuple(writer.behavior.readers)
+
     def writer_answers(self, writer: LocalWriter, transmissions: Sequence[WriterTransmission]) -> None:
         """A writer decided to send these; its timer may have moved and somebody may wait for its progress."""
         if transmissions:
@@ -556,49 +560,40 @@ class Participant:
         self.outbound.answer(reader_guid, proxy, answers)
         self.proxy_touched(reader.behavior, proxy)
 
-    # --- builtin endpoints -------------------------------------------------------------------------------
-
-    def _create_builtin_endpoints(self) -> None:
-        for topic in BUILTIN_TOPICS:
-            common = {"topic_name": topic.name, "type_name": topic.name, "qos": BUILTIN_QOS}
-            writer = DiscoveredWriterData(guid=Guid.of(self.guid.prefix, topic.writer_id), **common)  # type: ignore[arg-type]
-            reader = DiscoveredReaderData(guid=Guid.of(self.guid.prefix, topic.reader_id), **common)  # type: ignore[arg-type]
-            self._add_writer(writer)
-            self._add_reader(reader, _BuiltinInbox(topic.reader_id, self._waiting), None)
-
-    def _process_builtin_changes(self, now: float) -> None:
-        waiting = list(self._waiting)
-        self._waiting.clear()
-        for reader_id, change in waiting:
-            if reader_id == ids.SEDP_PUBLICATIONS_READER:
-                self.discovery.receive_publication(change, now)
-            elif reader_id == ids.SEDP_SUBSCRIPTIONS_READER:
-                self.discovery.receive_subscription(change, now)
-            elif reader_id == ids.PARTICIPANT_MESSAGE_READER:
-                self.liveliness.receive_participant_message(change, now)
-            else:
-                self.hooks.receive_message(change, now)
+    # --- what the hooks want ------------------------------------------------------------------------------
 
     def hooks_timer_fired(self) -> None:
         """The hooks' deadline is no longer armed, whatever it was."""
         self._hooks_deadline = math.inf
 
-    def _collect_hook_effects(self) -> None:
-        for effect in self.hooks.drain_effects():
-            match effect:
-                case SendMessage(writer_id, change):
-                    self._send_generic_message(self.local_writers[Guid.of(self.guid.prefix, writer_id)], change)
-                case HookCompute():
-                    asked = effect
-                    self._effects.append(
-                        Compute(asked.job, lambda result, now, asked=asked: self.hooks.computed(asked, result, now))  # type: ignore[misc]
-                    )
-                case Decided():
-                    self._decided(effect, self.now)
+    def _act_on_hook_effects(self) -> None:
+        """Until they want nothing more: a match that they admit may bring keys that are to be sent."""
+        while effects := self.hooks.drain_effects():
+            for effect in effects:
+                self._act_on_hook_effect(effect)
+            self.flush()
         deadline = self.hooks.next_deadline()
         if deadline != self._hooks_deadline:
             self._hooks_deadline = deadline
             self.alarms.security(deadline)
+
+    def _act_on_hook_effect(self, effect: HookEffect) -> None:
+        match effect:
+            case SendMessage(writer_id, change):
+                self._send_generic_message(self.local_writers[Guid.of(self.guid.prefix, writer_id)], change)
+            case HookCompute():
+                self._effects.append(Compute(effect.job, partial(self._computed, effect)))
+            case Decided(local, remote, admission):
+                self._decided(local, remote, admission)
+            case Revoked(reason):
+                self.status(self.guid, SecurityRevoked(reason=reason))
+                self.recorder.security(None, SecurityStep.REVOKED, reason)
+
+    def _computed(self, effect: HookCompute, result: object, now: float) -> None:
+        """A job has come back; whether anybody still waits for it, the hooks tell by its generation."""
+        self.now = now
+        if not self._is_closed:
+            self.hooks.computed(effect, result, now)
 
     def _send_generic_message(self, writer: LocalWriter, change: CacheChange) -> None:
         """What the hooks have to tell another participant; one that never acknowledges is given up."""
@@ -607,24 +602,20 @@ class Participant:
             self.discovery.participant_lost(destination, LossReason.UNRESPONSIVE, self.now)
             return
         self.write(writer, change.kind, bytes(change.payload), change.key, self.now, destination=destination)
-        self.flush()
 
-    def _decided(self, effect: Decided, now: float) -> None:
-        if effect.local != self.guid:
-            self.matchmaker.decided(effect.local, effect.remote, effect.admission, now)
+    def _decided(self, local: Guid, remote: Guid, admission: Admission) -> None:
+        if local != self.guid:
+            pairs = self.builtin if local.entity_id.is_builtin else self.matchmaker
+            pairs.decided(local, remote, admission, self.now)
             return
-        proxy = self.participants.get(effect.remote[:12])
-        if proxy is None:
-            return
-        if isinstance(effect.admission, Refused):
-            self.status(self.guid, SecurityRefused(remote=effect.remote, reason=effect.admission.reason))
-            self.discovery.participant_lost(effect.remote, LossReason.REJECTED_BY_SECURITY, now)
-        else:
-            self.discovery.participant_admitted(proxy, now)
+        proxy = self.participants.get(remote[:12])
+        if proxy is not None:
+            self.admission.decided(proxy, admission, self.now)
 
     # --- making endpoints --------------------------------------------------------------------------------
 
-    def _add_writer(self, data: DiscoveredWriterData, *, filters: bool = False) -> LocalWriter:
+    def add_writer(self, data: DiscoveredWriterData, *, filters: bool = False) -> LocalWriter:
+        """A writer in our tables, announced by nobody and matched with nobody."""
         overhead = self.hooks.overhead(data.guid, ())
         behavior = (FilteringWriter if filters else StatefulWriter)(
             data.guid,
@@ -639,8 +630,16 @@ class Participant:
         writer = self.local_writers[data.guid] = LocalWriter(data, behavior, self.outbound.new_packer())
         return writer
 
-    def _add_reader(self, data: DiscoveredReaderData, history: ChangeSink, keys: KeyCodec | None) -> LocalReader:
-        behavior = StatefulReader(
+    def add_reader(
+        self,
+        data: DiscoveredReaderData,
+        history: ChangeSink,
+        keys: KeyCodec | None,
+        *,
+        behavior_class: type[StatefulReader] = StatefulReader,
+    ) -> LocalReader:
+        """A reader in our tables, announced by nobody and matched with nobody."""
+        behavior = behavior_class(
             data.guid,
             data.qos,
             history,

@@ -14,7 +14,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredParticipantData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
-from ..trace.reasons import DropReason, LossReason, SampleLossReason
+from ..trace.reasons import DropReason, LossReason, SampleLossReason, SecurityStep
 from .effects import SendDatagram
 
 if TYPE_CHECKING:
@@ -101,6 +101,9 @@ class Recorder:
             self._put("Incompatible", local, remote, topic_name, reason.policy, reason.offered, reason.requested)
         if not refusal.incompatibilities:
             self._put("Incompatible", local, remote, topic_name, refusal.kind, refusal.offered, refusal.requested)
+
+    def security(self, remote: Guid | None, step: SecurityStep, detail: str = "") -> None:
+        self._put("SecurityEvent", remote, step, detail)
 
     # --- data and statuses -------------------------------------------------------------------------------
 

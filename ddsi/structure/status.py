@@ -23,6 +23,7 @@ __all__ = [
     "SampleLost",
     "SampleRejected",
     "SecurityRefused",
+    "SecurityRevoked",
     "Status",
     "SubscriptionMatched",
 ]
@@ -155,6 +156,16 @@ class SecurityRefused:
     reason: str = ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecurityRevoked:
+    """The participant's own identity or permissions have ended: it closes.  DDS-Security 1.1 §8.3.2.11.7.
+
+    Whatever is asked of it or its entities afterwards raises NotAllowedBySecurity with this ``reason``.
+    """
+
+    reason: str = ""
+
+
 Status = (
     PublicationMatched
     | SubscriptionMatched
@@ -168,4 +179,5 @@ Status = (
     | SampleRejected
     | InconsistentTopic
     | SecurityRefused
+    | SecurityRevoked
 )

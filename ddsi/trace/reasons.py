@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["DropReason", "LossReason", "RejectReason", "SampleLossReason"]
+__all__ = ["DropReason", "LossReason", "RejectReason", "SampleLossReason", "SecurityStep"]
 
 
 class DropReason(StrEnum):
@@ -135,3 +135,18 @@ class RejectReason(StrEnum):
     INSTANCES_LIMIT = "instances_limit"
     SAMPLES_LIMIT = "samples_limit"
     SAMPLES_PER_INSTANCE_LIMIT = "samples_per_instance_limit"
+
+
+class SecurityStep(StrEnum):
+    """What security decided about somebody: ``what`` in a SecurityEvent of the engine.  DDS-Security 1.1 §8.8.2."""
+
+    AUTHENTICATING = "authenticating"
+    """A participant has said who it is; until this is proved only ParticipantStatelessMessage is exchanged with it."""
+    ADMITTED = "admitted"
+    """A participant was authenticated, or may take part without."""
+    REFUSED = "refused"
+    """A participant, or the endpoint named, may not take part; the detail says why."""
+    KEYS_AWAITED = "keys_awaited"
+    """A match with this endpoint waits for its keys."""
+    REVOKED = "revoked"
+    """Our own identity or permissions have ended; the participant closes."""

@@ -6,16 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddsi.behavior.defrag import FRAGMENT_SILENCE, DefragBudget, Defragmenter, PartialSample
+from ddsi.behavior.defrag import FRAGMENT_SILENCE, DefragBudget, Defragmenter, Keep, PartialSample
 
 TO_ALL = bytes(4)
 R1, R2 = b"\0\0\1\4", b"\0\0\2\4"
 
 
-def defragmenter(
-    budget: DefragBudget | None = None, *, max_samples: int = 8, keeps_lowest: bool = True
-) -> Defragmenter:
-    return Defragmenter(budget or DefragBudget(1 << 20), max_samples=max_samples, keeps_lowest=keeps_lowest)
+def defragmenter(budget: DefragBudget | None = None, *, max_samples: int = 8, keep: Keep = Keep.LOWEST) -> Defragmenter:
+    return Defragmenter(budget or DefragBudget(1 << 20), max_samples=max_samples, keep=keep)
 
 
 def add(
@@ -177,11 +175,29 @@ def test_reliable_keeps_the_lowest_when_full() -> None:
 
 
 def test_best_effort_keeps_the_newest_when_full() -> None:
-    defrag = defragmenter(max_samples=2, keeps_lowest=False)
+    defrag = defragmenter(max_samples=2, keep=Keep.HIGHEST)
     for number in (5, 7, 9):
         assert add(defrag, number, 1) is not None
     assert list(defrag.partial_for(R1)) == [7, 9]
     assert defrag.dropped == 1
+
+
+def test_where_numbers_say_nothing_those_that_began_last_are_kept() -> None:
+    """Forged numbers, however high, do not keep out a low one."""
+    defrag = defragmenter(max_samples=2, keep=Keep.NEWEST)
+    for number in (1 << 60, 7, 1 << 61, 8):
+        assert add(defrag, number, 1) is not None
+    assert list(defrag.partial_for(R1)) == [1 << 61, 8]
+    assert defrag.dropped == 2
+
+
+def test_where_anybody_may_have_begun_a_sample_another_size_begins_it_anew() -> None:
+    defrag = defragmenter(keep=Keep.NEWEST)
+    add(defrag, 1, 1, of=3)
+    for fragment in (1, 2, 3):
+        assert not is_complete(add(defrag, 1, fragment, of=4))
+    assert is_complete(add(defrag, 1, 4, of=4))
+    assert (defrag.dropped, len(defrag), defrag.octets) == (1, 0, 0)
 
 
 def test_a_sample_beyond_the_whole_budget_is_refused_before_memory_is_taken() -> None:
@@ -234,11 +250,11 @@ def test_a_writer_that_is_gone_gives_everything_back() -> None:
         st.tuples(st.integers(0, 2), st.integers(1, 12), st.sampled_from([TO_ALL, R1, R2]), st.integers(1, 4)),
         max_size=120,
     ),
-    st.booleans(),
+    st.sampled_from(Keep),
 )
-def test_counted_and_bounded_whatever_comes(arrivals: list[tuple[int, int, bytes, int]], keeps_lowest: bool) -> None:
+def test_counted_and_bounded_whatever_comes(arrivals: list[tuple[int, int, bytes, int]], keep: Keep) -> None:
     budget = DefragBudget(200)
-    defrags = [defragmenter(budget, max_samples=3, keeps_lowest=keeps_lowest) for _ in range(3)]
+    defrags = [defragmenter(budget, max_samples=3, keep=keep) for _ in range(3)]
     for which, number, reader, fragment in arrivals:
         add(defrags[which], number, fragment, of=4, size=8, reader=reader)
         if fragment == 4:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from ddsi.behavior.defrag import FRAGMENT_SILENCE, DefragBudget, Defragmenter
+from ddsi.behavior.defrag import FRAGMENT_SILENCE, DefragBudget, Defragmenter, Keep
 from ddsi.behavior.schedules import NACK_DELAY, NACK_REPEAT_FIRST, NACK_REPEAT_MIN
 from ddsi.behavior.stateful_reader import RemoteWriter, StatefulReader
 from ddsi.behavior.transmissions import SendAckNack, SendNackFrag
@@ -48,12 +48,16 @@ class Pair:
         self.reader: StatefulReader = stateful_reader(self.sink, qos, max_samples=max_samples)
         self.data = writer_data(vendor_id=vendor_id)
         self.proxy: WriterProxy = self.reader.matched_writer_add(self.data, (LOCATOR,), 0.0, uses_filter=uses_filter)
-        self.remote = RemoteWriter(self.data, Defragmenter(DefragBudget(1 << 20), max_samples=100, keeps_lowest=True))
+        self.remote = RemoteWriter(self.data, Defragmenter(DefragBudget(1 << 20), max_samples=100, keep=Keep.LOWEST))
         self.remote.readers.append((self.reader, self.proxy))
         self.remote.readers_changed()
         self._count = 0
         if greeted and self.proxy.is_reliable:
             self.heartbeat(1, 0, final=True)
+
+    @property
+    def keep(self) -> Keep:
+        return self.remote.defragmenter.keep
 
     def data_in(self, *sequence_numbers: int, now: float = 0.0) -> list[int]:
         """Changes arrive; returns how many were lost before each."""
@@ -412,7 +416,7 @@ def test_a_best_effort_reader_of_a_reliable_writer_keeps_the_newest() -> None:
     """It asks for nothing, so what is not finished when a later sample is, never will be."""
     pair = Pair(BEST_EFFORT)
     assert not pair.remote.is_reliable
-    assert not pair.remote.defragmenter.keeps_lowest
+    assert pair.keep is Keep.HIGHEST
     for number in range(1, 10):
         pair.fragment(number, 1)
     pair.data_in(9)
@@ -425,10 +429,11 @@ def test_what_is_kept_follows_the_readers_that_are_there() -> None:
     other = stateful_reader(Sink())
     pair.remote.readers.append((other, other.matched_writer_add(pair.data, (LOCATOR,), 0.0)))
     pair.remote.readers_changed()
-    assert pair.remote.defragmenter.keeps_lowest
+    kept = [pair.keep]
     pair.remote.readers.pop()
     pair.remote.readers_changed()
-    assert not pair.remote.defragmenter.keeps_lowest
+    kept.append(pair.keep)
+    assert kept == [Keep.LOWEST, Keep.HIGHEST]
 
 
 # --- history --------------------------------------------------------------------------------------------------------

@@ -180,11 +180,11 @@ def test_only_propagated_properties_are_sent() -> None:
 
 
 def test_participant_data_without_encapsulation_in_big_endian() -> None:
-    """As the handshake of DDS Security carries it (c.pdata): without the plugins' own parameters."""
+    """As the handshake of DDS Security carries it (c.pdata), the plugins' own parameters turned round too."""
     octets = participant_parameters(FULL_PARTICIPANT, little_endian=False).encode()
     made, _ = ParameterList.decode(octets, little_endian=False)
     read = read_participant(made, source_prefix=PREFIX, vendor_id=CYCLONE, protocol_version=(2, 1))
-    assert read == replace(FULL_PARTICIPANT, security_parameters=())
+    assert read == FULL_PARTICIPANT
 
 
 @pytest.mark.parametrize(
@@ -682,6 +682,13 @@ def test_security_parameters_are_kept_as_little_endian_octets(pid: int, little: 
     kept = ((pid, bytes.fromhex(little)),)
     assert writer_of((pid, little)).security_parameters == kept
     assert decode_writer(big_endian(WRITER, (pid, big)), CYCLONE).security_parameters == kept
+
+
+@pytest.mark.parametrize(("pid", "little", "big"), SECURITY)
+def test_security_parameters_are_turned_round_for_a_big_endian_list(pid: int, little: str, big: str) -> None:
+    data = DiscoveredParticipantData(guid=PARTICIPANT, security_parameters=((pid, bytes.fromhex(little)),))
+    assert participant_parameters(data, little_endian=False).get(pid) == bytes.fromhex(big)
+    assert participant_parameters(data).get(pid) == bytes.fromhex(little)
 
 
 @pytest.mark.parametrize("octets", ["00000002 6100", "ffffffff", "00000002 61000000 ffffffff 00000000"])

@@ -13,6 +13,7 @@ from ddsi.spi import (
     ADMITTED,
     PENDING,
     Admission,
+    Announcement,
     Compute,
     Decided,
     HookEffect,
@@ -59,13 +60,28 @@ class Hooks(Plaintext):
         self.asked.append("remote_participant")
         return self.participants
 
+    def remote_participant_changed(self, data: DiscoveredParticipantData, now: float) -> Admission:
+        self.asked.append("remote_participant_changed")
+        return self.participants
+
     def remote_participant_lost(self, guid: Guid) -> None:
         self.asked.append("remote_participant_lost")
 
     def local_endpoint_deleted(self, guid: Guid) -> None:
         self.asked.append("local_endpoint_deleted")
 
+    def announcement(self) -> Announcement:
+        self.asked.append("announcement")
+        return super().announcement()
+
+    def announced(self, parameters: bytes) -> None:
+        self.asked.append("announced")
+        self.said = parameters
+
     def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
+        if local.entity_id.is_builtin:
+            self.asked.append(f"match {remote.topic_name}")
+            return ADMITTED
         self.asked.append("match")
         return self.matches
 
@@ -100,8 +116,10 @@ def test_the_moments_of_a_life_are_asked_in_order() -> None:
     a.close()
     domain.run(1)
     assert hooks.asked == [
-        "local_participant", "remote_participant", "match", "unmatch", "local_endpoint_deleted",
-        "remote_participant_lost",
+        "local_participant", "announcement", "announced", "remote_participant",
+        "match DCPSPublication", "match DCPSPublication", "match DCPSSubscription", "match DCPSSubscription",
+        "match DCPSParticipantMessage", "match DCPSParticipantMessage",
+        "match", "unmatch", "local_endpoint_deleted", "remote_participant_lost",
     ]  # fmt: skip
 
 
@@ -146,14 +164,49 @@ def test_a_pending_participant_is_matched_when_it_is_decided() -> None:
     assert domain.run_until(lambda: reader.matched_count == 1, 2)
 
 
-def test_a_pending_participant_that_is_refused_in_the_end_is_gone() -> None:
+def test_a_pending_participant_that_is_refused_in_the_end_is_known_as_such() -> None:
+    """It stays in the table, so that its announcements are no news; and it may be admitted later."""
     domain, a, b, hooks = pair()
     hooks.participants = PENDING
     domain.run(1)
-    hooks.effects.append(Decided(b.guid, a.guid, Refused("wrong signature")))
+    refused = Decided(b.guid, a.guid, Refused("wrong signature"))
+    hooks.effects += [refused, refused]
     b.pump()
-    assert a.guid.prefix not in b.engine.participants
-    assert SecurityRefused(remote=a.guid, reason="wrong signature") in b.statuses_of(SecurityRefused)
+    assert b.statuses_of(SecurityRefused) == [SecurityRefused(remote=a.guid, reason="wrong signature")]
+    assert not b.engine.participants[a.guid.prefix].is_admitted
+    hooks.effects.append(Decided(b.guid, a.guid, ADMITTED))
+    b.pump()
+    assert b.engine.participants[a.guid.prefix].is_admitted
+
+
+def test_an_admitted_participant_that_is_refused_is_gone() -> None:
+    domain, a, b, hooks = pair()
+    a.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 1)
+    hooks.participants = Refused("its certificate was revoked")
+    hooks.effects.append(Decided(b.guid, a.guid, hooks.participants))
+    b.pump()
+    assert (reader.matched_count, len(b.engine.known_writers), a.guid.prefix in b.engine.participants) == (0, 0, False)
+    domain.run(100)
+    assert not b.engine.participants[a.guid.prefix].is_admitted, "it is known again, and refused"
+    revoked = SecurityRefused(remote=a.guid, reason="its certificate was revoked")
+    assert b.statuses_of(SecurityRefused) == [revoked, revoked]
+
+
+def test_a_refused_participant_is_asked_about_whenever_it_announces_itself() -> None:
+    """So that security may let it try again after a while."""
+    domain, a, b, hooks = pair()
+    hooks.participants = Refused("it did not answer for 100 s")
+    domain.run(100)
+    asked = hooks.asked.count("remote_participant_changed")
+    assert asked > 3
+    assert len(b.statuses_of(SecurityRefused)) == 1
+    hooks.participants = ADMITTED
+    assert domain.run_until(lambda: b.engine.participants[a.guid.prefix].is_admitted, 40)
+    asked = hooks.asked.count("remote_participant_changed")
+    domain.run(100)
+    assert hooks.asked.count("remote_participant_changed") == asked
 
 
 @pytest.mark.parametrize("admission", [ADMITTED, Refused("topic Square is denied to it")])

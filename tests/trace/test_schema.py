@@ -8,7 +8,7 @@ import pytest
 
 from ddsi.trace.event import SCHEMA_NAME, SCHEMA_VERSION, Category
 from ddsi.trace.events import EVENT_TYPES
-from ddsi.trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason
+from ddsi.trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, SecurityStep
 
 SCHEMA = (Path(__file__).parents[2] / "docs" / "trace.md").read_text(encoding="utf-8")
 
@@ -49,6 +49,7 @@ def test_every_event_stands_under_its_category() -> None:
         ("Why somebody is gone", LossReason),
         ("Why samples are lost", SampleLossReason),
         ("Why a sample was rejected", RejectReason),
+        ("What security decided", SecurityStep),
     ],
 )
 def test_every_reason_stands_in_the_schema(title: str, reasons: type[DropReason]) -> None:
