@@ -30,7 +30,7 @@ EVENT = BuiltinLoggingTypeV2(
     structured_data=[StructuredDataEntry("DDS", [NameValuePair("domain_id", "0"), NameValuePair("guid", "A.B")])],
 )
 # Written down by hand from the OMG's IDL and the rules of XCDR1: 64-bit numbers at multiples of 8, lengths at multiples
-# of 4, and a map as the count of its pairs, then each key and value.
+# of 4, and a map as the count of its pairs, then each key and value.  Fast CDR writes the same for a std::map.
 OCTETS = bytes.fromhex(
     "00010000"  # CDR, little endian
     "0a000000"  # facility, padding
