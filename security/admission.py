@@ -1,0 +1,326 @@
+"""Whether a participant that was discovered may join: from its announcement to its keys, and until it has to go.
+
+DDS-Security 1.1 §8.8.2 (discovery and authentication), §8.8.6 (access control), §8.8.8 (key registration).  A refused
+participant stays known, with the reason, until it is lost or announces another identity, so that it is neither asked
+nor answered again and again.  Who was once authenticated is never taken for unauthenticated under the same Guid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from ddsi.serialization import ParameterId
+from ddsi.spi import ADMITTED, PENDING, Admission, Compute, Decided, HookEffect, Refused, Revoked
+from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
+from ddsi.structure.discovered import DiscoveredParticipantData
+from ddsi.structure.guid import Guid
+
+from .access_control_plugin import AccessControl
+from .announced import info, participant_refusal, token
+from .authentication_plugin import Authentication, AuthStatusKind, RemoteIdentity
+from .generic_message import GenericMessage
+from .handles import HandshakeHandle, IdentityHandle, Pending, PermissionsHandle
+from .handshake import Authenticated, Failed, Handshake, Output, Reported, Send, Work
+from .key_exchange import KeyExchange
+from .loading import Plugins
+from .logging_plugin import LogLevel
+from .mailbox import Mailbox
+from .own_participant import OwnParticipant
+from .remote_participant import RemoteParticipant, Standing
+from .tokens import NIL, DataHolder
+
+__all__ = ["AdmissionDesk"]
+
+_MAX_BANNED: Final = 1024
+_SECURE: Final = BuiltinEndpoints.PARTICIPANT_SECURE_WRITER
+
+
+class AdmissionDesk:
+    """Authenticates and admits the peers of one participant.  It is the listener of both plugins."""
+
+    def __init__(
+        self,
+        plugins: Plugins,
+        own: OwnParticipant,
+        remotes: dict[bytes, RemoteParticipant],
+        keys: KeyExchange,
+        mailbox: Mailbox,
+        effects: list[HookEffect],
+        *,
+        jitter: Callable[[], float],
+        changed: Callable[[], None],
+    ) -> None:
+        self._plugins = plugins
+        self._own = own
+        self._remotes = remotes
+        self._keys = keys
+        self._mailbox = mailbox
+        self._effects = effects
+        self._jitter = jitter
+        self._changed = changed
+        self._participant_data = b""
+        self._jobs: dict[int, tuple[Guid, Callable[[object, float], None]]] = {}
+        self._generation = 0
+        self._banned: dict[Guid, str] = {}
+        plugins.authentication.set_listener(self)
+        plugins.access_control.set_listener(self)
+
+    def announced(self, parameters: bytes) -> None:
+        """What the handshake says of us, under our signature."""
+        self._participant_data = parameters
+
+    # --- they come ---------------------------------------------------------------------------------------
+
+    def discovered(self, data: DiscoveredParticipantData, now: float) -> Admission:
+        remote = self._remotes[data.guid.prefix] = RemoteParticipant(data, Standing.PENDING)
+        if data.guid in self._banned:
+            return self._refused_at_once(remote, self._banned[data.guid])
+        identity_token = token(data.security_parameters, ParameterId.IDENTITY_TOKEN)
+        # An identity without the secure SPDP topic, or the topic without it, is no secured participant (Cyclone DDS).
+        if identity_token == NIL or _SECURE not in data.builtin_endpoints:
+            return self._unauthenticated(remote, "it announces no identity")
+        difference = participant_refusal(
+            self._own.info, info(data.security_parameters, ParameterId.PARTICIPANT_SECURITY_INFO)
+        )
+        if difference:
+            return self._unauthenticated(remote, f"its governance protects participants otherwise: {difference}")
+        remote.handshake = self._handshake(remote, identity_token)
+        self._act(remote, remote.handshake.begin(now), now)
+        return self._answer(remote)
+
+    def changed(self, data: DiscoveredParticipantData, now: float) -> Admission:
+        """It announces something else.  Another identity, before it was admitted, is another participant."""
+        remote = self._remotes.get(data.guid.prefix)
+        if remote is None:
+            return self.discovered(data, now)
+        before, remote.data = remote.data, data
+        if remote.standing is not Standing.ADMITTED and before.security_parameters != data.security_parameters:
+            self.lost(data.guid)
+            return self.discovered(data, now)
+        return self._answer(remote)
+
+    def lost(self, guid: Guid) -> None:
+        """Nothing of it stays."""
+        remote = self._remotes.pop(guid.prefix, None)
+        if remote is None:
+            return
+        self._release(remote)
+        for generation in [number for number, (subject, _) in self._jobs.items() if subject == guid]:
+            del self._jobs[generation]
+        self._changed()
+
+    def _handshake(self, remote: RemoteParticipant, identity_token: DataHolder) -> Handshake:
+        authentication, own = self._plugins.authentication, self._own
+
+        def validate(
+            auth_request: DataHolder,
+        ) -> RemoteIdentity | Refused | Pending[RemoteIdentity | Refused]:
+            return authentication.validate_remote_identity(auth_request, own.identity, identity_token, remote.guid)
+
+        return Handshake(
+            authentication,
+            own.identity,
+            validate=validate,
+            participant_data=lambda: self._participant_data,
+            jitter=self._jitter,
+        )
+
+    def _unauthenticated(self, remote: RemoteParticipant, reason: str) -> Admission:
+        if not self._own.attributes.allow_unauthenticated_participants:
+            return self._refused_at_once(remote, f"{reason}, and governance admits only authenticated participants")
+        remote.standing = Standing.UNAUTHENTICATED
+        self._changed()
+        return ADMITTED
+
+    def _refused_at_once(self, remote: RemoteParticipant, reason: str) -> Refused:
+        remote.standing, remote.reason = Standing.REFUSED, reason
+        self._log(LogLevel.WARNING_LEVEL, f"participant {remote.guid} is refused: {reason}", "refused")
+        return Refused(reason)
+
+    @staticmethod
+    def _answer(remote: RemoteParticipant) -> Admission:
+        if remote.standing is Standing.REFUSED:
+            return Refused(remote.reason)
+        return PENDING if remote.standing is Standing.PENDING else ADMITTED
+
+    # --- the handshake -----------------------------------------------------------------------------------
+
+    def receive(self, remote: RemoteParticipant, message: GenericMessage, now: float) -> None:
+        """A message of the stateless topic."""
+        if remote.handshake is not None:
+            self._act(remote, remote.handshake.receive(message, now), now)
+
+    def computed(self, effect: Compute, result: object, now: float) -> None:
+        _, proceed = self._jobs.pop(effect.generation, (None, None))
+        if proceed is not None:
+            proceed(result, now)
+
+    def handle_timeout(self, now: float) -> None:
+        for remote in list(self._remotes.values()):
+            if remote.handshake is not None and remote.handshake.next_deadline() <= now:
+                self._act(remote, remote.handshake.handle_timeout(now), now)
+
+    def next_deadline(self) -> float:
+        return min(
+            (remote.handshake.next_deadline() for remote in self._remotes.values() if remote.handshake is not None),
+            default=float("inf"),
+        )
+
+    def _act(self, remote: RemoteParticipant, outputs: list[Output], now: float) -> None:
+        for output in outputs:
+            match output:
+                case Send():
+                    self._mailbox.post_handshake(remote, output)
+                case Work(job):
+                    self._compute(remote, job, lambda result, now: self._worked(remote, result, now))
+                case Authenticated(handle):
+                    self._authenticated(remote, handle, now)
+                case Reported(reason):
+                    self._report(remote, reason)
+                case Failed(reason, _):
+                    self._failed(remote, reason)
+
+    def _worked(self, remote: RemoteParticipant, result: object, now: float) -> None:
+        if remote.handshake is not None:
+            self._act(remote, remote.handshake.worked(result, now), now)
+
+    def _compute(
+        self, remote: RemoteParticipant, job: Callable[[], object], proceed: Callable[[object, float], None]
+    ) -> None:
+        self._generation += 1
+        self._jobs[self._generation] = (remote.guid, proceed)
+        self._effects.append(Compute(remote.guid, self._generation, _guarded(job)))
+
+    def _report(self, remote: RemoteParticipant, reason: str) -> None:
+        """Said once for each new reason: what a stranger sends must not fill the log."""
+        if reason != remote.reason:
+            remote.reason = reason
+            self._log(LogLevel.WARNING_LEVEL, f"authentication of {remote.guid}: {reason}", "authentication")
+            self._effects.append(Decided(self._own.guid, remote.guid, Refused(reason)))
+
+    def _failed(self, remote: RemoteParticipant, reason: str) -> None:
+        if remote.standing is Standing.PENDING and self._own.attributes.allow_unauthenticated_participants:
+            self._log(LogLevel.NOTICE_LEVEL, f"{remote.guid} is taken as unauthenticated: {reason}", "authentication")
+            remote.standing, remote.handshake = Standing.UNAUTHENTICATED, None
+            self._changed()
+            self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
+        else:
+            self._report(remote, reason)
+
+    # --- permissions and keys ----------------------------------------------------------------------------
+
+    def _authenticated(self, remote: RemoteParticipant, handle: HandshakeHandle, now: float) -> None:
+        authentication, access = self._plugins.authentication, self._plugins.access_control
+        assert remote.handshake is not None
+        assert remote.handshake.remote_identity is not None
+        remote.shared_secret = authentication.get_shared_secret(handle)
+        result = access.validate_remote_permissions(
+            authentication,
+            self._own.identity,
+            remote.handshake.remote_identity,
+            token(remote.data.security_parameters, ParameterId.PERMISSIONS_TOKEN),
+            authentication.get_authenticated_peer_credential_token(handle),
+        )
+        if isinstance(result, Pending):
+            self._compute(remote, result.job, lambda result, now: self._permitted(remote, result, now))
+        else:
+            self._permitted(remote, result, now)
+
+    def _permitted(self, remote: RemoteParticipant, result: object, now: float) -> None:
+        if isinstance(result, Pending):
+            self._compute(remote, result.job, lambda result, now: self._permitted(remote, result, now))
+        elif isinstance(result, Refused):
+            self._refuse(remote, result.reason)
+        elif isinstance(result, PermissionsHandle):
+            remote.permissions = result
+            refusal = self._plugins.access_control.check_remote_participant(result, self._own.domain_id, remote.data)
+            if refusal is not None:
+                self._refuse(remote, refusal.reason)
+            else:
+                self._admit(remote)
+
+    def _admit(self, remote: RemoteParticipant) -> None:
+        assert remote.handshake is not None
+        assert remote.handshake.remote_identity is not None
+        assert remote.permissions is not None
+        assert remote.shared_secret is not None
+        remote.crypto = self._plugins.cryptographic.register_matched_remote_participant(
+            self._own.crypto, remote.handshake.remote_identity, remote.permissions, remote.shared_secret
+        )
+        remote.standing, remote.reason = Standing.ADMITTED, ""
+        self._changed()
+        subject = self._plugins.authentication.get_subject_name(remote.handshake.remote_identity)
+        self._log(LogLevel.INFO_LEVEL, f"participant {remote.guid} is {subject}, authenticated", "authenticated")
+        self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
+
+    def _refuse(self, remote: RemoteParticipant, reason: str) -> None:
+        """It may not join, or not any longer; and it will not be asked again under this Guid."""
+        self._log(LogLevel.WARNING_LEVEL, f"participant {remote.guid} is refused: {reason}", "refused")
+        self._ban(remote.guid, reason)
+        self._release(remote)
+        remote.standing, remote.reason = Standing.REFUSED, reason
+        self._changed()
+        self._effects.append(Decided(self._own.guid, remote.guid, Refused(reason)))
+
+    def _ban(self, guid: Guid, reason: str) -> None:
+        while len(self._banned) >= _MAX_BANNED:
+            del self._banned[next(iter(self._banned))]
+        self._banned[guid] = reason
+
+    def _release(self, remote: RemoteParticipant) -> None:
+        """Wipe what can be wiped; the key that the two share goes last of the keys."""
+        self._keys.forget(remote)
+        if remote.permissions is not None:
+            self._plugins.access_control.return_permissions_handle(remote.permissions)
+            remote.permissions = None
+        if remote.shared_secret is not None:
+            self._plugins.authentication.return_sharedsecret_handle(remote.shared_secret)
+            remote.shared_secret = None
+        if remote.handshake is not None:
+            remote.handshake.close()
+            remote.handshake = None
+
+    # --- what ends while it is used ----------------------------------------------------------------------
+
+    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle) -> None:
+        self._revoked(
+            "the identity certificate of", lambda remote: _identity_of(remote) is handle, handle is self._own.identity
+        )
+
+    def on_status_changed(self, plugin: Authentication, handle: IdentityHandle, status_kind: AuthStatusKind) -> None:
+        """The status token goes with the next announcement."""
+
+    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle) -> None:
+        self._revoked(
+            "the permissions of", lambda remote: remote.permissions is handle, handle is self._own.permissions
+        )
+
+    def _revoked(self, what: str, concerns: Callable[[RemoteParticipant], bool], is_ours: bool) -> None:
+        if is_ours:
+            reason = f"{what} this participant have ended: renew them and create it anew"
+            self._log(LogLevel.CRITICAL_LEVEL, reason, "revoked")
+            self._effects.append(Revoked(reason))
+            return
+        for remote in list(self._remotes.values()):
+            if concerns(remote):
+                self._refuse(remote, f"{what} {remote.guid} have ended")
+
+    def _log(self, level: LogLevel, text: str, category: str) -> None:
+        self._plugins.logging.log(level, text, category)
+
+
+def _identity_of(remote: RemoteParticipant) -> IdentityHandle | None:
+    return remote.handshake.remote_identity if remote.handshake is not None else None
+
+
+def _guarded(job: Callable[[], object]) -> Callable[[], object]:
+    """A plugin that fails must not take the participant with it: its failure is a refusal."""
+
+    def run() -> object:
+        try:
+            return job()
+        except Exception as error:
+            return Refused(f"the plugin failed: {type(error).__name__}: {error}")
+
+    return run

@@ -1,0 +1,251 @@
+"""Protects what a participant sends and opens what it receives: from the core's Guids to the plugin's handles.
+
+DDS-Security 1.1 §8.8.10 (what is protected with what), §8.5.1.9.  And one thing more, which no plugin can know: what
+ought to have arrived protected (:meth:`Protection.admits`), and whether the key that opened a submessage is that of the
+endpoint which it names.  Without the latter, an authenticated insider could speak for any endpoint of its participant,
+and without the former, anybody for anyone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from ddsi.messages.raw_submessage import SubmessageKind
+from ddsi.spi import NO_OVERHEAD, NOT_FOR_US, NoKeys, Octets, Outcome, Overhead, Parts, Refused, Rejected
+from ddsi.spi import Protection as Level
+from ddsi.structure.builtin_entity_ids import SPDP_WRITER
+from ddsi.structure.guid import Guid, GuidPrefix
+from ddsi.structure.vendor import VendorId
+
+from .attributes import ParticipantSecurityAttributes
+from .crypto_transform_plugin import SecureSubmessageCategory
+from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
+from .key_exchange import KeyExchange, Pair
+from .local_endpoint import NEVER_IN_MESSAGES, PLAIN_BUILTIN, LocalEndpoint
+from .plugins import Cryptographic
+from .remote_participant import RemoteParticipant, Standing
+
+__all__ = ["Protection"]
+
+_CYCLONE_DDS: Final = VendorId(b"\x01\x10")
+_SUBMESSAGE_HEADER: Final = 4
+
+# Where in a submessage, behind its header, the entity stands that sent it: (offset, is it a writer?).
+_SENDER: Final = {
+    SubmessageKind.DATA: 8,
+    SubmessageKind.DATA_FRAG: 8,
+    SubmessageKind.HEARTBEAT: 4,
+    SubmessageKind.HEARTBEAT_FRAG: 4,
+    SubmessageKind.GAP: 4,
+    SubmessageKind.ACKNACK: 0,
+    SubmessageKind.NACK_FRAG: 0,
+}
+_NOTHING: Parts = ()
+_NONE, _MESSAGE, _SUBMESSAGE = int(Level.NONE), int(Level.MESSAGE), int(Level.SUBMESSAGE)
+_IMPOSSIBLE: Final = 1 << 8
+
+
+class Protection:
+    """For one participant of ours.  Its tables are those of the service and of the key exchange; it only reads them."""
+
+    def __init__(
+        self,
+        cryptographic: Cryptographic,
+        local_participant: ParticipantCryptoHandle,
+        attributes: ParticipantSecurityAttributes,
+        local_endpoints: dict[Guid, LocalEndpoint],
+        remotes: dict[bytes, RemoteParticipant],
+        keys: KeyExchange,
+    ) -> None:
+        self._cryptographic = cryptographic
+        self._local_participant = local_participant
+        self._is_rtps_protected = attributes.is_rtps_protected
+        self._local_endpoints = local_endpoints
+        self._remotes = remotes
+        self._keys = keys
+        self._handles: dict[
+            tuple[Guid, tuple[Guid, ...]], tuple[list[DatareaderCryptoHandle], list[DatawriterCryptoHandle]]
+        ] = {}
+        self._required: dict[bytes, int] = {}
+        """What the submessages of a remote endpoint need; by its Guid, until anything about it changes."""
+        self.refused = 0
+        """How many submessages and messages were not sent, as there is no key to protect them with."""
+
+    def changed(self) -> None:
+        """Endpoints or participants came or went."""
+        self._required.clear()
+        self._handles.clear()
+
+    # --- outwards ----------------------------------------------------------------------------------------
+
+    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        endpoint, count = self._local_endpoints.get(sender), max(len(receivers), 1)
+        payload = submessage = message = 0
+        if endpoint is not None and endpoint.handle is not None:
+            added = self._cryptographic.overhead(endpoint.handle, count)
+            payload, submessage = added.payload, added.submessage
+        if self._is_rtps_protected and sender.entity_id not in NEVER_IN_MESSAGES:
+            message = self._cryptographic.overhead(self._local_participant, count).message
+        return Overhead(payload, submessage, message) if payload or submessage or message else NO_OVERHEAD
+
+    def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
+        endpoint = self._local_endpoints.get(writer)
+        if endpoint is None or not endpoint.attributes.is_payload_protected:
+            return payload
+        handle = endpoint.handle
+        assert isinstance(handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
+        encoded = bytearray()
+        refusal = self._cryptographic.encode_serialized_payload(encoded, bytearray(), payload, handle)
+        assert refusal is None, refusal
+        return encoded
+
+    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+        endpoint = self._local_endpoints.get(sender)
+        if endpoint is None or not endpoint.attributes.is_submessage_protected:
+            return submessage
+        encoded = bytearray()
+        plain = submessage[0] if len(submessage) == 1 else b"".join(submessage)
+        readers, writers = self._receivers(sender, receivers)
+        refusal: Refused | None
+        if isinstance(endpoint.handle, DatawriterCryptoHandle) and readers:
+            refusal = self._cryptographic.encode_datawriter_submessage(encoded, plain, endpoint.handle, readers)
+        elif isinstance(endpoint.handle, DatareaderCryptoHandle) and writers:
+            refusal = self._cryptographic.encode_datareader_submessage(encoded, plain, endpoint.handle, writers)
+        else:
+            return self._nothing()
+        return (encoded,) if refusal is None else self._nothing()
+
+    def _receivers(
+        self, sender: Guid, receivers: Sequence[Guid]
+    ) -> tuple[list[DatareaderCryptoHandle], list[DatawriterCryptoHandle]]:
+        """The handles of those that have keys; the same for every sample until somebody comes or goes."""
+        key = (sender, tuple(receivers))
+        found = self._handles.get(key)
+        if found is None:
+            pairs = (self._keys.pairs.get((sender, receiver)) for receiver in receivers)
+            handles = [pair.handle for pair in pairs if pair is not None]
+            found = self._handles[key] = (
+                [handle for handle in handles if isinstance(handle, DatareaderCryptoHandle)],
+                [handle for handle in handles if isinstance(handle, DatawriterCryptoHandle)],
+            )
+        return found
+
+    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        if not self._is_rtps_protected or not receivers or receivers[0].entity_id in NEVER_IN_MESSAGES:
+            return message
+        participants = {receiver[:12]: None for receiver in receivers}
+        handles = [
+            remote.crypto
+            for remote in (self._remotes.get(prefix) for prefix in participants)
+            if remote is not None and remote.crypto is not None
+        ]
+        if not handles:
+            return self._nothing()
+        encoded = bytearray()
+        refusal = self._cryptographic.encode_rtps_message(encoded, b"".join(message), self._local_participant, handles)
+        return (encoded,) if refusal is None else self._nothing()
+
+    def _nothing(self) -> Parts:
+        self.refused += 1
+        return _NOTHING
+
+    # --- inwards -----------------------------------------------------------------------------------------
+
+    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+        remote = self._remotes.get(source)
+        if remote is None or remote.crypto is None:
+            return _no_keys(message, 20)
+        return self._cryptographic.decode_rtps_message(message, self._local_participant, remote.crypto)
+
+    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+        remote = self._remotes.get(source)
+        if remote is None or remote.crypto is None:
+            return _no_keys(protected, 0)
+        whose = self._cryptographic.preprocess_secure_submsg(protected, self._local_participant, remote.crypto)
+        if isinstance(whose, Outcome):
+            return whose
+        sender: DatawriterCryptoHandle | DatareaderCryptoHandle | None
+        if whose.category is SecureSubmessageCategory.DATAREADER_SUBMESSAGE:
+            sender = whose.datareader
+        else:
+            sender = whose.datawriter
+        pair = self._keys.by_handle.get(sender) if sender is not None else None
+        if pair is None:
+            return NOT_FOR_US
+        plain = self._decode(protected, pair)
+        if isinstance(plain, Outcome) or self._speaks_for_itself(plain, pair):
+            return plain
+        return Rejected(f"it was protected by {pair.remote}, and speaks for another")
+
+    def _decode(self, protected: Octets, pair: Pair) -> Octets | Outcome:
+        local, remote = pair.local.handle, pair.handle
+        if isinstance(remote, DatawriterCryptoHandle) and isinstance(local, DatareaderCryptoHandle):
+            return self._cryptographic.decode_datawriter_submessage(protected, local, remote)
+        if isinstance(remote, DatareaderCryptoHandle) and isinstance(local, DatawriterCryptoHandle):
+            return self._cryptographic.decode_datareader_submessage(protected, local, remote)
+        return NOT_FOR_US
+
+    def _speaks_for_itself(self, plain: Octets, pair: Pair) -> bool:
+        """Is the sender that a submessage names the one whose key opened it?  INFO_TS names none (Fast DDS)."""
+        if len(plain) < _SUBMESSAGE_HEADER + 12:
+            return len(plain) >= _SUBMESSAGE_HEADER and plain[0] == SubmessageKind.INFO_TS
+        if plain[0] == SubmessageKind.INFO_TS:
+            return True
+        offset = _SENDER.get(plain[0])  # type: ignore[call-overload]
+        if offset is None:
+            return False
+        start = _SUBMESSAGE_HEADER + offset
+        named = bytes(plain[start : start + 4])
+        if pair.local.is_volatile:  # one key protects both directions' submessages
+            return named in NEVER_IN_MESSAGES and named[0] == 0xFF
+        return named == pair.remote[12:]
+
+    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        pair = self._payload_pair(writer)
+        if pair is None:
+            return payload
+        local, remote = pair.local.handle, pair.handle
+        assert isinstance(local, DatareaderCryptoHandle)
+        assert isinstance(remote, DatawriterCryptoHandle)
+        return self._cryptographic.decode_serialized_payload(payload, b"", local, remote)
+
+    def protects_payload(self, writer: Guid) -> bool:
+        return self._payload_pair(writer) is not None
+
+    def _payload_pair(self, writer: Guid) -> Pair | None:
+        for pair in self._keys.by_remote.get(writer, ()):
+            if pair.local.attributes.is_payload_protected:
+                return pair
+        return None
+
+    # --- what must be protected --------------------------------------------------------------------------
+
+    def admits(self, sender: bytes, protection: Level) -> bool:
+        required = self._required.get(sender)
+        if required is None:
+            required = self._required[sender] = self._requirement(Guid(sender))
+        return required & protection._value_ == required  # the number: arithmetic with flags is slow
+
+    def _requirement(self, sender: Guid) -> int:
+        """What a submessage of this remote endpoint needs.  Never less than our governance says of its topic."""
+        remote = self._remotes.get(sender.prefix)
+        if remote is None or remote.standing is Standing.UNAUTHENTICATED:
+            return _NONE
+        entity = sender.entity_id
+        if entity == SPDP_WRITER and remote.standing is Standing.ADMITTED:
+            return _IMPOSSIBLE  # anybody can write there; it speaks of itself on the secure topic now (§7.4.1.6)
+        required = _NONE
+        for pair in self._keys.by_remote.get(sender, ()):
+            if pair.local.attributes.is_submessage_protected:
+                required |= _SUBMESSAGE
+        if not self._is_rtps_protected or entity in NEVER_IN_MESSAGES:
+            return required
+        if entity in PLAIN_BUILTIN and remote.data.vendor_id == _CYCLONE_DDS:
+            return required
+        return required | _MESSAGE
+
+
+def _no_keys(octets: Octets, offset: int) -> NoKeys:
+    """The key id stands behind the submessage header and the transformation kind of SEC_PREFIX or SRTPS_PREFIX."""
+    return NoKeys(bytes(octets[offset + 8 : offset + 12]))

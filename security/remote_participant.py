@@ -1,0 +1,43 @@
+"""A participant that was discovered, as security sees it: how far it is trusted, and what is known of it by now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from ddsi.structure.discovered import DiscoveredParticipantData
+from ddsi.structure.guid import Guid
+
+from .generic_message import GenericMessage
+from .handles import ParticipantCryptoHandle, PermissionsHandle, SharedSecretHandle
+from .handshake import Handshake
+
+__all__ = ["RemoteParticipant", "Standing"]
+
+
+class Standing(Enum):
+    """What a remote participant may do."""
+
+    UNAUTHENTICATED = "has no identity; governance admits such participants to what is not protected"
+    PENDING = "is being authenticated"
+    ADMITTED = "is authenticated, and its permissions let it join"
+    REFUSED = "may do nothing"
+
+
+@dataclass(slots=True)
+class RemoteParticipant:
+    """``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first."""
+
+    data: DiscoveredParticipantData
+    standing: Standing
+    reason: str = ""
+    handshake: Handshake | None = None
+    permissions: PermissionsHandle | None = None
+    shared_secret: SharedSecretHandle | None = None
+    crypto: ParticipantCryptoHandle | None = None
+    has_keys: bool = False
+    early: dict[tuple[Guid, Guid], tuple[GenericMessage, float]] = field(default_factory=dict)
+
+    @property
+    def guid(self) -> Guid:
+        return self.data.guid
