@@ -27,7 +27,6 @@ from ddsi.spi import (
     ProtectedEndpoint,
     Refused,
 )
-from ddsi.spi import Protection as Level
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.cache_change import CacheChange
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
@@ -261,7 +260,7 @@ class SecurityService:
     decode_submessage: Callable[[Octets, GuidPrefix], Octets | Outcome]
     decode_payload: Callable[[Guid, Octets], Octets | Outcome]
     protects_payload: Callable[[Guid], bool]
-    admits: Callable[[bytes, Level], bool]
+    admits: Callable[[bytes, int], bool]
 
 
 def _protected_refusal(endpoint: LocalEndpoint, remote: DiscoveredWriterData | DiscoveredReaderData) -> Refused | None:
