@@ -95,7 +95,7 @@ def check_brackets(document: LoadedDocument, node: Node) -> Iterator[Finding]:
     if "[" in node.text:
         yield BRACKET.at(
             document.path,
-            f"{node.text!r}: where a [ is not closed, or a range is not complete, Cyclone DDS, Fast DDS and OpenDDS differ",
+            f"{node.text!r}: where a [ is not closed, or a range is not complete, Cyclone, Fast DDS and OpenDDS differ",
             line=node.line,
             remedy="list the names, or use * and ?",
         )
