@@ -93,6 +93,8 @@ class Whole:
     tokens: list[Token] = field(default_factory=list)
     messages: list[Message] = field(default_factory=list)
     """Of the stateless topic, repeats too."""
+    announcements: list[tuple[bytes, bytes, bytes]] = field(default_factory=list)
+    """Of the other builtin writers: the writer's id, who sent it, and the payload."""
     changes: dict[tuple[bytes, int], bytes] = field(default_factory=dict)
     """Payloads of the user's writers by writer Guid and sequence number, fragments joined; with repeats, the last."""
     key_only: set[tuple[bytes, int]] = field(default_factory=set)
@@ -189,6 +191,8 @@ class Whole:
         number = source + change.writer_id, change.sequence_number
         is_user = change.writer_id[3] < 0xC0
         if change.writer_id not in (STATELESS_WRITER, VOLATILE_WRITER) and not is_user:
+            if change.payload and not change.is_key:
+                self.announcements.append((change.writer_id, source, change.payload))
             return
         payload = self.open_payload(source, change) if is_user else change.payload
         if change.fragment_start is not None:
