@@ -54,6 +54,7 @@ _DOTTED = re.compile(r"(?:OID\.)?((?:0|[1-9]\d{0,19})(?:\.(?:0|[1-9]\d{0,19})){1
 _KEYWORD = re.compile(r"[A-Za-z][A-Za-z0-9-]{0,63}")
 # In the one-line form nothing escapes: a slash begins an attribute only if a type and a = follow.
 _ONE_LINE = re.compile(r"/(?=[A-Za-z][A-Za-z0-9-]{0,63}=|[0-9][0-9.]{0,99}=)")
+_SPACE = " \t\r\n"  # what may stand around types and values; other white space is part of them
 _HEX_PAIR = re.compile(r"[0-9A-Fa-f]{2}")
 # The string types of X.509's DirectoryString, and IA5String, with their codecs.
 _STRINGS = {0x0C: "utf-8", 0x13: "ascii", 0x14: "latin-1", 0x16: "ascii", 0x1C: "utf-32-be", 0x1E: "utf-16-be"}
@@ -71,7 +72,7 @@ class SubjectName:
         """Read RFC 4514's form, OpenSSL's ``C = US, CN = alice``, or its one-line form, which begins with a slash."""
         if len(text) > MOST_CHARACTERS:
             raise _malformed(f"it has {len(text)} characters; there may be {MOST_CHARACTERS}")
-        stripped = text.strip()
+        stripped = text.strip(_SPACE)
         found = _one_line(stripped) if stripped.startswith("/") else _rfc4514(text)
         if not found:
             raise _malformed("it is empty")
@@ -108,7 +109,7 @@ def _one_line(text: str) -> list[tuple[str, str]]:
         raise _malformed("after the slash, TYPE=value is expected")
     for start, end in zip(starts, [*(start - 1 for start in starts[1:]), len(text)], strict=True):
         kind, _, value = text[start:end].partition("=")
-        _append(found, _identifier(kind), value.strip())
+        _append(found, _identifier(kind), value.strip(_SPACE))
     return found
 
 
@@ -120,7 +121,7 @@ def _rfc4514(text: str) -> list[tuple[str, str]]:
         equals = text.find("=", position)
         if equals < 0:
             raise _malformed(f"TYPE=value is expected, {text[position : position + 40]!r} is there")
-        kind = _identifier(text[position:equals].strip())
+        kind = _identifier(text[position:equals].strip(_SPACE))
         value, position = _value(text, equals + 1)
         _append(found, kind, value)
         if position == len(text):
@@ -130,11 +131,11 @@ def _rfc4514(text: str) -> list[tuple[str, str]]:
 
 def _value(text: str, position: int) -> tuple[str, int]:
     """The value from ``position``, and the index of the separator after it, or the length of the text."""
-    while text.startswith((" ", "\t", "\n", "\r"), position):
+    while text.startswith(tuple(_SPACE), position):
         position += 1
     if text.startswith("#", position):
         end = next((index for index in range(position, len(text)) if text[index] in ",;+"), len(text))
-        return _from_der(text[position + 1 : end].strip()), end
+        return _from_der(text[position + 1 : end].strip(_SPACE)), end
     octets = bytearray()  # escapes are octets of UTF-8 (RFC 4514 §2.4)
     kept = 0  # as far as white space is not at the end
     quoted = False
@@ -159,7 +160,7 @@ def _value(text: str, position: int) -> tuple[str, int]:
             break
         else:
             octets += character.encode("utf-8", "surrogatepass")
-            if quoted or not character.isspace():
+            if quoted or character not in _SPACE:
                 kept = len(octets)
     if quoted:
         raise _malformed("a quotation mark is not closed")

@@ -170,7 +170,7 @@ def _node(root: etree._Element, document: str, line_offset: int) -> Node:
                 numbers[tag] = numbers.get(tag, 0) + 1
                 label = ", ".join(filter(None, (rule, _label(tag, child.get("name", ""), numbers[tag]))))
             children.append(build(child, depth + 1, label))
-        tag, text = str(element.tag), (element.text or "").strip()
+        tag, text = str(element.tag), (element.text or "").strip(" \t\r\n")
         return Node(document, tag, text, element.get("name", ""), line, rule, may_be_ignored, tuple(children))
 
     return build(root, 1, "")
