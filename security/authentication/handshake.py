@@ -146,6 +146,8 @@ class ReplySent(_Agreed):
     def on_final(self, final: HandshakeMessageToken) -> Callable[[], Authenticated]:
         """Judge the peer's Final, which needs no answer."""
         signature, secret = required(final, "signature"), self.secret
+        if not secret:
+            raise NotTrusted("the handshake was returned meanwhile")
         required(final, "challenge1")
         required(final, "challenge2")
         self.values.require_in(final)

@@ -22,7 +22,11 @@ from ddsi.spi import Refused
 from ddsi.structure.guid import Guid
 from ddsi.structure.vendor import VendorId
 from ddsi_security.authentication import PkiDhAuthentication
+from ddsi_security.authentication.algorithms import KeyAgreement, NameForm
+from ddsi_security.authentication.handshake import RequestSent
+from ddsi_security.authentication.handshake_tokens import Credentials, request_token
 from ddsi_security.authentication.identities import LocalIdentityHandle, RemoteIdentityHandle
+from ddsi_security.authentication.key_agreement import EphemeralKey, draw_private_key
 from ddsi_security.plugins import HandshakeStep, Pending, ValidationResult
 from ddsi_security.tokens import NIL, DataHolder
 
@@ -238,3 +242,20 @@ def pair(initiator_kind: str = "EC", replier_kind: str = "EC", **vendors: Vendor
         for seed, (name, kind) in enumerate(zip(names, (initiator_kind, replier_kind), strict=True), 1)
     ]
     return Pair(sides[0], sides[1], **vendors)
+
+
+def foreign_request(both: Pair, agreement: KeyAgreement, *, der: bool = False, revised: bool = False) -> RequestSent:
+    """A Request as others write it: with another key agreement than ours, or in the words of 1.2."""
+    side = both.initiator
+    form = NameForm(nul=False, revised=revised)
+    credentials = Credentials(
+        c_id=side.identity.pem,
+        c_perm=side.identity.credential,
+        c_pdata=side.data,
+        c_dsign_algo=form.write(side.identity.certificate.algorithm),
+        c_kagree_algo=(agreement.spellings[-1] if revised and agreement.spellings else agreement.name).encode(),
+    )
+    key = EphemeralKey(agreement, draw_private_key(agreement, random.Random(7).randbytes), der=der)
+    challenge1 = both.replier_seen.our_challenge or bytes(32)
+    token = request_token(credentials, dh1=key.public, challenge1=challenge1)
+    return RequestSent(both.replier_seen, token, credentials.hash(), key)
