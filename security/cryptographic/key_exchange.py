@@ -191,4 +191,4 @@ def _objection(material: KeyMaterial, protection: Protection | None, what: str) 
 
 def _replace(sender: RemoteWriter | RemoteReader, ring: KeyRing, material: KeyMaterial) -> None:
     ring.replace(material)
-    sender.participant.index(sender, ring.key_ids)
+    sender.participant.index(sender, ring.by_id)

@@ -19,14 +19,13 @@ from cryptography.exceptions import InvalidTag
 from ddsi.spi import Octets, Outcome, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
-from .aes_gcm import LARGE, encrypt_tail
-from .received_keys import KeyRing, ReceivedKey, fitting_keys
+from .aes_gcm import LARGE, append_encrypted
+from .received_keys import KeyRing, ReceivedKey
 from .session_keys import NONCE_AT, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
 
 __all__ = ["USED_UP", "decode_payload", "encode_payload", "overhead"]
 
-_PADDING: Final = (b"", bytes(3), bytes(2), bytes(1))
 _LONGEST_PADDING: Final = 3
 _NO_MACS: Final = bytes(4)
 _FOOTER_LENGTH: Final = MAC_LENGTH + len(_NO_MACS)
@@ -44,30 +43,25 @@ def overhead(protection: Protection | None) -> int:
 
 def encode_payload(buffer: bytearray, plain: Octets, key: SendingKey) -> Refused | None:
     """Append the protected form of ``plain`` to ``buffer``."""
+    if len(plain) & 3:
+        plain = bytes(plain) + bytes(-len(plain) & 3)
     length = len(plain)
-    padding = _PADDING[length & 3]
-    length += len(padding)
     header = key.next_header(length)
     if header is None:
         return USED_UP
     nonce = header[NONCE_AT:]
     if not key.encrypts:
-        start = len(buffer) + HEADER_LENGTH
+        mac = key.aead.encrypt(nonce, b"", plain)
         buffer += header
         buffer += plain
-        buffer += padding
-        with memoryview(buffer) as whole:
-            mac = key.aead.encrypt(nonce, b"", whole[start:])
         buffer += mac + _NO_MACS
     elif length < LARGE:
-        sealed = key.aead.encrypt(nonce, plain if not padding else bytes(plain) + padding, None)
+        sealed = key.aead.encrypt(nonce, plain, None)
         buffer += b"".join((header, length.to_bytes(4, "big"), sealed, _NO_MACS))
     else:
-        start = len(buffer) + _CONTENT_AT
         buffer += header + length.to_bytes(4, "big")
-        buffer += plain
-        buffer += padding
-        buffer += encrypt_tail(buffer, start, key.aead, nonce) + _NO_MACS
+        append_encrypted(buffer, plain, key.aead, nonce)
+        buffer += _NO_MACS
     return None
 
 
@@ -80,7 +74,7 @@ def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -
     if len(octets) < HEADER_LENGTH + _FOOTER_LENGTH:
         return Rejected(f"a protected payload of {len(octets)} octets")
     header = bytes(octets[:HEADER_LENGTH])
-    keys = fitting_keys(ring, header, expected)
+    keys = ring.fitting(header[:4], header[4:8], expected)
     if isinstance(keys, Outcome):
         return keys
     for key in keys:
@@ -105,11 +99,12 @@ def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey) -> bytes 
     if octets[end : end + 4] != _NO_MACS:
         raise MalformedMessage("a payload with receiver-specific MACs", element="CryptoFooter", offset=end)
     session_id, nonce = header[8:12], header[NONCE_AT:]
-    session = key.session(session_id)
+    session = key.sessions.get(session_id) or key.derive(session_id)
     plain = octets[HEADER_LENGTH:mac_at]
     if key.encrypts:
         plain = session.aead.decrypt(nonce, octets[_CONTENT_AT:end], None)
     else:
         session.aead.decrypt(nonce, octets[mac_at:end], plain)
-    key.keep(session_id, session)
+    if session_id not in key.sessions:
+        key.keep(session_id, session)
     return plain

@@ -47,7 +47,7 @@ NONCE_AT: Final = 8
 _COUNTER_MASK: Final = (1 << 63) - 1
 _REPLIERS_BIT: Final = 1 << 63
 _SESSION_MASK: Final = (1 << 32) - 1
-_SUFFIX: Final = struct.Struct(">Q")
+_pack_suffix: Final = struct.Struct(">Q").pack
 
 
 def session_key(material: KeyMaterial, session_id: bytes) -> bytes:
@@ -106,25 +106,24 @@ class SendingKey:
 
         Its last 12 octets, from NONCE_AT on, are the nonce; read ``aead`` and ``session_id`` after this, not before.
         """
-        blocks = (octets >> 4) + 1
-        if blocks > self._blocks_left and not self._end_session(blocks):
+        self._blocks_left -= (octets >> 4) + 1
+        if self._blocks_left < 0 and not self._end_session((octets >> 4) + 1):
             return None
-        self._blocks_left -= blocks
-        self._count = count = (self._count + 1) & _COUNTER_MASK
+        self._count = count = self._count + 1 & _COUNTER_MASK
         assert count != self._session_began_at, "a nonce would be used twice"
-        return self._head + _SUFFIX.pack(self._side | count)
+        return self._head + _pack_suffix(self._side | count)
 
     def wipe(self) -> None:
         self.material.wipe()
         self._blocks_left = -1
-        self._session = self._first_session - 1 & _SESSION_MASK  # the last of them: there is no next one
+        self._session = self._first_session - 1 & _SESSION_MASK  # the last one of all
 
     def _end_session(self, blocks: int) -> bool:
-        """Go over to the next session, with room for so many blocks at least.  False: there is none left."""
+        """Go over to the next session and take so many blocks of it.  False: there is none left."""
         following = self._session + 1 & _SESSION_MASK
         if following == self._first_session:
             return False
-        self._begin_session(following, max(self._max_blocks, blocks))
+        self._begin_session(following, max(self._max_blocks, blocks) - blocks)
         return True
 
     def _begin_session(self, session: int, blocks: int) -> None:

@@ -6,14 +6,16 @@ decided here; what is done with them in :mod:`.payload` and :mod:`.envelope`.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
+from typing import cast
 
 from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
-from . import envelope, payload
+from . import envelope, opening, payload, sealing
 from .crypto_handles import (
     NO_KEY,
     LocalParticipant,
@@ -105,7 +107,7 @@ class AesGcmGmacTransform:
         if key is None or protection is None:
             return NO_KEY
         receivers = _receiver_keys(receiving_participant_crypto_list) if protection.origin_authenticated else ()
-        return envelope.seal_message(encoded_rtps_message, plain_rtps_message, key, receivers)
+        return sealing.seal_message(encoded_rtps_message, plain_rtps_message, key, receivers)
 
     # --- inwards ---------------------------------------------------------------------------------------------
 
@@ -118,7 +120,7 @@ class AesGcmGmacTransform:
         """§8.5.1.9.5.  The header of what is returned was authenticated, by the INFO_SRC that came protected."""
         assert isinstance(sending_participant_crypto, RemoteParticipant)
         remote = sending_participant_crypto
-        return envelope.open_message(encoded_rtps_message, remote.ring, remote.local.protection)
+        return opening.open_message(encoded_rtps_message, remote.ring, remote.local.protection)
 
     def preprocess_secure_submsg(
         self,
@@ -134,7 +136,7 @@ class AesGcmGmacTransform:
         assert isinstance(sending_participant_crypto, RemoteParticipant)
         remote = sending_participant_crypto
         try:
-            key_id = envelope.read_crypto_header(encoded_rtps_submessage)[4:8]
+            key_id = envelope.read_key_id(envelope.SUBMESSAGE, encoded_rtps_submessage, 0)
             if key_id == NO_KEY_ID:
                 return _volatile(remote)
             senders = remote.senders.get(key_id)
@@ -143,6 +145,8 @@ class AesGcmGmacTransform:
             sender = senders[0] if len(senders) == 1 else _addressed(senders, key_id, encoded_rtps_submessage)
         except MalformedMessage as error:
             return Rejected(str(error))
+        except struct.error:
+            return Rejected("the octets end within the envelope")
         if isinstance(sender, RemoteWriter):
             return SecureSubmessage(SecureSubmessageCategory.DATAWRITER_SUBMESSAGE, sender, sender.reader)
         return SecureSubmessage(SecureSubmessageCategory.DATAREADER_SUBMESSAGE, sender.writer, sender)
@@ -156,7 +160,7 @@ class AesGcmGmacTransform:
         """§8.5.1.9.7.  The sender's handle is that of the pair, and knows its reader."""
         sender = sending_datawriter_crypto
         assert isinstance(sender, RemoteWriter)
-        return envelope.open_submessage(encoded_rtps_submessage, sender.ring, sender.reader.submessage)
+        return opening.open_submessage(encoded_rtps_submessage, sender.ring, sender.reader.submessage)
 
     def decode_datareader_submessage(
         self,
@@ -167,7 +171,7 @@ class AesGcmGmacTransform:
         """§8.5.1.9.8.  The sender's handle is that of the pair, and knows its writer."""
         sender = sending_datareader_crypto
         assert isinstance(sender, RemoteReader)
-        return envelope.open_submessage(encoded_rtps_submessage, sender.ring, sender.writer.submessage)
+        return opening.open_submessage(encoded_rtps_submessage, sender.ring, sender.writer.submessage)
 
     def decode_serialized_payload(
         self,
@@ -182,11 +186,8 @@ class AesGcmGmacTransform:
         return payload.decode_payload(encoded_buffer, sender.payload_ring, sender.reader.payload)
 
 
-_Receivers = Sequence[ParticipantCryptoHandle] | Sequence[DatareaderCryptoHandle] | Sequence[DatawriterCryptoHandle]
-
-
 def _encode_submessage(
-    buffer: bytearray, submessage: Octets, sender: LocalWriter | LocalReader, receivers: _Receivers
+    buffer: bytearray, submessage: Octets, sender: LocalWriter | LocalReader, receivers: Sequence[object]
 ) -> Refused | None:
     if sender.is_volatile:
         return _encode_volatile(buffer, submessage, receivers)
@@ -194,25 +195,21 @@ def _encode_submessage(
     if key is None or protection is None:
         return NO_KEY
     receiver_keys = _receiver_keys(receivers) if protection.origin_authenticated else ()
-    return envelope.seal_submessage(buffer, submessage, key, receiver_keys)
+    return sealing.seal_submessage(buffer, submessage, key, receiver_keys)
 
 
-def _encode_volatile(buffer: bytearray, submessage: Octets, receivers: _Receivers) -> Refused | None:
+def _encode_volatile(buffer: bytearray, submessage: Octets, receivers: Sequence[object]) -> Refused | None:
     if len(receivers) != 1:
         return Refused(f"a volatile submessage is for one receiver, not for {len(receivers)}")
     receiver = receivers[0]
     assert isinstance(receiver, RemoteReader | RemoteWriter)
     key: SendingKey | None = receiver.participant.exchange_key
-    return NO_KEY if key is None else envelope.seal_submessage(buffer, submessage, key, ())
+    return NO_KEY if key is None else sealing.seal_submessage(buffer, submessage, key, ())
 
 
-def _receiver_keys(receivers: _Receivers) -> list[ReceiverKey]:
-    keys = []
-    for receiver in receivers:
-        assert isinstance(receiver, RemoteParticipant | RemoteReader | RemoteWriter)
-        if receiver.receiver_key is not None:
-            keys.append(receiver.receiver_key)
-    return keys
+def _receiver_keys(receivers: Sequence[object]) -> list[ReceiverKey]:
+    known = cast("Sequence[RemoteParticipant | RemoteReader | RemoteWriter]", receivers)
+    return [key for receiver in known if (key := receiver.receiver_key) is not None]
 
 
 def _volatile(remote: RemoteParticipant) -> SecureSubmessage | Outcome:
@@ -226,9 +223,9 @@ def _addressed(
     senders: Sequence[RemoteWriter | RemoteReader], key_id: bytes, octets: Octets
 ) -> RemoteWriter | RemoteReader:
     """Of the pairs that have this key, the one whose receiver-specific key a MAC was made with; else the first."""
-    pairs = [(sender, key) for sender in senders for key in sender.ring.find(key_id)]
+    pairs = [(sender, key) for sender in senders for key in sender.ring.by_id.get(key_id, ())]
     if any(key.receiver_key_id != NO_KEY_ID for _, key in pairs):
-        addressed = envelope.receiver_key_ids(octets, encrypted=pairs[0][1].encrypts)
+        addressed = envelope.receiver_key_ids(octets)
         for sender, key in pairs:
             if key.receiver_key_id in addressed:
                 return sender

@@ -87,9 +87,9 @@ class Entropy:
         return drawn
 
 
-def sending_key(of: KeyMaterial | None = None, **options: int) -> SendingKey:
+def sending_key(of: KeyMaterial | None = None) -> SendingKey:
     """A key whose first header is that of the vectors."""
-    return SendingKey(of or material(), entropy_of(vectors.SESSION_ID, vectors.SUFFIX), **options)
+    return SendingKey(of or material(), entropy_of(vectors.SESSION_ID, vectors.SUFFIX))
 
 
 def receiver_key() -> ReceiverKey:

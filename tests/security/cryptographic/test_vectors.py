@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ddsi_security.cryptographic import envelope, payload, session_keys
+from ddsi_security.cryptographic import opening, payload, sealing, session_keys
 from ddsi_security.cryptographic.key_material import KeyMaterial, exchange_key_material
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from ddsi_security.handles import SharedSecretHandle
@@ -78,10 +78,10 @@ def test_payload(kind: TransformationKind, protected: bytes) -> None:
 def test_submessage(kind: TransformationKind, for_receiver: bool, plain: bytes, protected: bytes) -> None:
     receivers = [receiver_key()] if for_receiver else []
     buffer = bytearray()
-    assert envelope.seal_submessage(buffer, plain, sending_key(material(kind)), receivers) is None
+    assert sealing.seal_submessage(buffer, plain, sending_key(material(kind)), receivers) is None
     assert buffer == protected
     keys = ring(material(kind, for_receiver=for_receiver))
-    assert envelope.open_submessage(protected, keys, Protection(kind.encrypts, for_receiver)) == plain
+    assert opening.open_submessage(protected, keys, Protection(kind.encrypts, for_receiver)) == plain
 
 
 @pytest.mark.parametrize(("kind", "for_receiver", "plain", "protected"), MESSAGES)
@@ -89,16 +89,16 @@ def test_message(kind: TransformationKind, for_receiver: bool, plain: bytes, pro
     assert vectors.INFO_SOURCE[8:] == vectors.MESSAGE_HEADER[4:]
     receivers = [receiver_key()] if for_receiver else []
     buffer = bytearray()
-    assert envelope.seal_message(buffer, plain, sending_key(material(kind)), receivers) is None
+    assert sealing.seal_message(buffer, plain, sending_key(material(kind)), receivers) is None
     assert buffer == protected
     keys = ring(material(kind, for_receiver=for_receiver))
-    assert envelope.open_message(protected, keys, Protection(kind.encrypts, for_receiver)) == plain
+    assert opening.open_message(protected, keys, Protection(kind.encrypts, for_receiver)) == plain
 
 
 def test_volatile_submessage() -> None:
     key = session_keys.SendingKey(exchange_material(), entropy_of(vectors.SESSION_ID, vectors.SUFFIX))
     buffer = bytearray()
-    assert envelope.seal_submessage(buffer, vectors.VOLATILE_HEARTBEAT, key, []) is None
+    assert sealing.seal_submessage(buffer, vectors.VOLATILE_HEARTBEAT, key, []) is None
     assert buffer == vectors.VOLATILE_HEARTBEAT_ENCRYPTED
-    opened = envelope.open_submessage(bytes(buffer), ring(exchange_material()), Protection(encrypted=True))
+    opened = opening.open_submessage(bytes(buffer), ring(exchange_material()), Protection(encrypted=True))
     assert opened == vectors.VOLATILE_HEARTBEAT

@@ -1,0 +1,130 @@
+"""Opening: a submessage, or a message, comes out of its envelope, or it is said why it does not.
+
+DDS-Security 1.1 §9.5.3.3 (decode_datawriter_submessage, decode_datareader_submessage, decode_rtps_message).  All
+octets are untrusted until the common MAC was verified, and where the origin is authenticated, our own MAC too.
+"""
+
+from __future__ import annotations
+
+import struct
+from hmac import compare_digest
+from typing import Final
+
+from cryptography.exceptions import InvalidTag
+
+from ddsi.messages.raw_submessage import SubmessageKind
+from ddsi.spi import Octets, Outcome, Rejected
+from ddsi.structure.errors import MalformedMessage
+
+from .aes_gcm import LARGE, decrypt_joined
+from .envelope import HEAD, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, read_envelope, swapped
+from .received_keys import KeyRing
+from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, Protection
+
+__all__ = ["open_message", "open_submessage"]
+
+_RTPS: Final = b"RTPS"
+_INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
+_ENVELOPE_KINDS: Final = frozenset(range(SubmessageKind.SEC_BODY, SubmessageKind.SRTPS_POSTFIX + 1))
+
+_Plain = bytes | bytearray | memoryview
+
+
+def open_submessage(octets: Octets, ring: KeyRing, expected: Protection | None) -> Octets | Outcome:
+    """The one submessage in ``octets``, which begin with SEC_PREFIX and end with SEC_POSTFIX.
+
+    ``expected``: what the receiver's attributes ask for; None takes what the key says.
+    """
+    try:
+        plain = _open(SUBMESSAGE, octets, 0, ring, expected)
+        if not isinstance(plain, Outcome):
+            _check_submessage(plain)
+        return plain
+    except MalformedMessage as error:
+        return Rejected(str(error))
+    except struct.error:
+        return Rejected("the octets end within the envelope")
+
+
+def open_message(octets: Octets, ring: KeyRing, expected: Protection | None) -> Octets | Outcome:
+    """The message in ``octets``, whose first submessage is SRTPS_PREFIX.
+
+    What is returned is a message with its header, which is made of the INFO_SRC that was protected: so all of it was
+    authenticated.  The INFO_SRC has no further part in it.  What follows SRTPS_POSTFIX is in clear, and left out: Fast
+    DDS ends all its messages so.
+    """
+    try:
+        plain = _open(MESSAGE, octets, HEADER_LENGTH, ring, expected)
+        if isinstance(plain, Outcome):
+            return plain
+        _check_info_source(plain, octets)
+    except MalformedMessage as error:
+        return Rejected(str(error))
+    except struct.error:
+        return Rejected("the octets end within the envelope")
+    # INFO_SRC is laid out as a message's header, with `unused` where that has "RTPS".
+    if isinstance(plain, bytearray):
+        plain[4:8] = _RTPS
+        return memoryview(plain)[4:]
+    return b"".join((_RTPS, plain[8:]))
+
+
+def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: Protection | None) -> _Plain | Outcome:
+    """What lies in the envelope that begins at ``octets[at]``.  Raises MalformedMessage, struct.error."""
+    is_large = len(octets) >= LARGE
+    octets = memoryview(octets) if is_large else bytes(octets)
+    kind_octets, key_id, nonce, content_at, content_end, mac, macs_at, end = read_envelope(envelope, octets, at)
+    keys = ring.fitting(kind_octets, key_id, expected)
+    if isinstance(keys, Outcome):
+        return keys
+    content = octets[content_at:content_end]
+    session_id = nonce[:4]
+    for key in keys:
+        session = key.sessions.get(session_id) or key.derive(session_id)
+        plain: _Plain = content
+        try:
+            if not key.encrypts:
+                session.aead.decrypt(nonce, mac, content)
+            elif is_large:
+                plain = decrypt_joined(session.aead, nonce, content, mac)
+            else:
+                plain = session.aead.decrypt(nonce, b"".join((content, mac)), None)
+        except InvalidTag:
+            continue
+        if expected is not None and expected.origin_authenticated:
+            found = _find_receiver_mac(octets, macs_at, end, key.receiver_key_id)
+            if session.receiver_aead is None or found is None:
+                return Rejected("it bears no MAC for us")
+            if not compare_digest(session.receiver_aead.encrypt(nonce, b"", mac), found):
+                return Rejected("the MAC for us is wrong")
+        if session_id not in key.sessions:
+            key.keep(session_id, session)
+        return plain
+    return Rejected("the common MAC is wrong")
+
+
+def _find_receiver_mac(octets: bytes | memoryview, at: int, end: int, key_id: bytes) -> bytes | memoryview | None:
+    """The MAC that the sender made for us alone: without it, any fellow receiver might have sent this."""
+    while at < end:
+        mac_at = at + KEY_ID_LENGTH
+        at += RECEIVER_MAC_LENGTH
+        if octets[mac_at - KEY_ID_LENGTH : mac_at] == key_id:
+            return octets[mac_at:at]
+    return None
+
+
+def _check_submessage(plain: _Plain) -> None:
+    """One submessage and nothing else, and none that is an envelope itself."""
+    kind, flags, length = HEAD.unpack_from(plain)
+    if length and (length if flags & 1 else swapped(length)) != len(plain) - 4:
+        raise MalformedMessage(f"{len(plain)} octets are not one submessage", element="envelope")
+    if kind in _ENVELOPE_KINDS:
+        raise MalformedMessage("an envelope within an envelope", element="envelope")
+
+
+def _check_info_source(plain: _Plain, octets: Octets) -> None:
+    """INFO_SRC is the first, and authenticates what the header, in clear, said."""
+    if plain[:4] not in _INFO_SRC_HEADS or len(plain) < 24:
+        raise MalformedMessage("no INFO_SRC at the head of a protected message", element="INFO_SRC")
+    if plain[12:24] != octets[8:HEADER_LENGTH]:
+        raise MalformedMessage("INFO_SRC names another participant than the header", element="INFO_SRC")

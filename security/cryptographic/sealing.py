@@ -1,0 +1,122 @@
+"""Sealing: a submessage, or a message, goes into its envelope.
+
+DDS-Security 1.1 §9.5.3.3 (encode_datawriter_submessage, encode_datareader_submessage, encode_rtps_message).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Final
+
+from ddsi.messages.raw_submessage import SubmessageKind
+from ddsi.spi import Octets, Refused
+
+from .aes_gcm import LARGE, append_encrypted
+from .envelope import FOOTER_LENGTH, HEAD, LONGEST_BODY, MESSAGE, RECEIVER_MAC_LENGTH, SEC_BODY, SUBMESSAGE, Envelope
+from .payload import USED_UP
+from .session_keys import NONCE_AT, ReceiverKey, SendingKey
+from .transformation import HEADER_LENGTH, MAC_LENGTH
+
+__all__ = ["seal_message", "seal_submessage"]
+
+_MOST_RECEIVERS: Final = (LONGEST_BODY - FOOTER_LENGTH) // RECEIVER_MAC_LENGTH
+_PADDING: Final = (b"", bytes(3), bytes(2), bytes(1))
+_NO_MACS: Final = bytes(4)
+
+_INFO_SRC_HEAD: Final = HEAD.pack(SubmessageKind.INFO_SRC, 1, 20) + bytes(4)
+"""With the field ``unused``.  Version, vendor and prefix, which follow, lie together in the message's header too."""
+
+
+def seal_submessage(
+    buffer: bytearray, submessage: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
+) -> Refused | None:
+    """Append a submessage, protected.  Its length must be filled in: it is no longer the last of a message."""
+    return _seal(SUBMESSAGE, buffer, b"", submessage, key, receivers)
+
+
+def seal_message(
+    buffer: bytearray, message: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
+) -> Refused | None:
+    """Append a message: its header, and protected an INFO_SRC that repeats the header, and all its submessages."""
+    start = len(buffer)
+    if len(message) < LARGE:
+        message = bytes(message)
+    buffer += message[:HEADER_LENGTH]
+    refused = _seal(MESSAGE, buffer, _INFO_SRC_HEAD, memoryview(message)[4:], key, receivers)
+    if refused is not None:
+        del buffer[start:]
+    return refused
+
+
+def _seal(
+    envelope: Envelope,
+    buffer: bytearray,
+    lead: bytes,
+    rest: Octets,
+    key: SendingKey,
+    receivers: Sequence[ReceiverKey],
+) -> Refused | None:
+    """Append ``lead`` and ``rest``, protected as one."""
+    length = len(lead) + len(rest)
+    if length > LONGEST_BODY - 4 and key.encrypts:
+        return Refused(f"{length} octets do not fit into one SEC_BODY")
+    if length & 3 and not key.encrypts:
+        return Refused(f"{length} octets are to be signed, which is no multiple of 4")
+    if len(receivers) > _MOST_RECEIVERS:
+        return Refused(f"MACs for {len(receivers)} receivers do not fit into one footer")
+    header = key.next_header(length)
+    if header is None:
+        return USED_UP
+    nonce = header[NONCE_AT:]
+    if length >= LARGE:
+        mac = _append_large(envelope, buffer, header, lead, rest, key)
+    elif key.encrypts:
+        sealed = key.aead.encrypt(nonce, lead + rest if lead else rest, None)
+        mac = sealed[-MAC_LENGTH:]
+        padding = _PADDING[length & 3]
+        buffer += b"".join((envelope.prefix_head, header, _body_head(length), sealed[:-MAC_LENGTH], padding))
+    else:
+        plain = lead + rest if lead else rest
+        mac = key.aead.encrypt(nonce, b"", plain)
+        buffer += b"".join((envelope.prefix_head, header, plain))
+    if not receivers:
+        buffer += envelope.postfix_head + mac + _NO_MACS
+        return None
+    buffer += _postfix_head(envelope, len(receivers)) + mac + len(receivers).to_bytes(4, "big")
+    for receiver in receivers:
+        buffer += receiver.key_id + receiver.mac(key, nonce, mac)
+    return None
+
+
+def _append_large(
+    envelope: Envelope, buffer: bytearray, header: bytes, lead: bytes, rest: Octets, key: SendingKey
+) -> bytes:
+    """As :func:`_seal` does it up to the postfix, but copying the octets only once; returns the common MAC."""
+    nonce = header[NONCE_AT:]
+    buffer += envelope.prefix_head + header
+    if not key.encrypts:
+        start = len(buffer)
+        buffer += lead
+        buffer += rest
+        with memoryview(buffer) as whole, whole[start:] as plain:
+            return key.aead.encrypt(nonce, b"", plain)
+    length = len(lead) + len(rest)
+    buffer += _body_head(length)
+    append_encrypted(buffer, rest, key.aead, nonce, lead=lead)
+    mac = bytes(buffer[-MAC_LENGTH:])
+    del buffer[-MAC_LENGTH:]
+    buffer += _PADDING[length & 3]
+    return mac
+
+
+# Few lengths are in use at a time, and to look one up is quicker than to pack it.
+@lru_cache(maxsize=256)
+def _body_head(length: int) -> bytes:
+    """SEC_BODY up to the cipher text, which has so many octets."""
+    return HEAD.pack(SEC_BODY, 1, 4 + length + (-length & 3)) + length.to_bytes(4, "big")
+
+
+@lru_cache(maxsize=256)
+def _postfix_head(envelope: Envelope, receivers: int) -> bytes:
+    return HEAD.pack(envelope.postfix, 1, FOOTER_LENGTH + RECEIVER_MAC_LENGTH * receivers)
