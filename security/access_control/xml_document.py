@@ -31,6 +31,9 @@ _MUST_INTERPRET = "must_interpret"
 _CODECS = {"utf-8": "utf-8", "utf8": "utf-8", "us-ascii": "ascii", "ascii": "ascii", "iso-8859-1": "latin-1"}
 _DECLARATION = re.compile(rb"<\?xml\s[^>]{0,200}?encoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"'][^>]{0,200}?\?>")
 
+_POSITION = re.compile(r", line \d+, column \d+\Z")
+_LINE = re.compile(r"line (\d{1,9})")
+
 
 @dataclass(frozen=True, slots=True)
 class Node:
@@ -104,7 +107,9 @@ def _parse(xml: bytes, name: str, first_line: int) -> etree._Element:
         root = etree.fromstring(text.encode("utf-8"), parser)
     except etree.XMLSyntaxError as error:
         line, _ = error.position
-        raise DocumentError(name, f"it is not XML: {error.msg}", line=first_line - 1 + max(line, 1)) from error
+        # The message ends with the position, and may name another line; both count from the beginning of the XML.
+        message = _LINE.sub(lambda found: f"line {int(found.group(1)) + first_line - 1}", _POSITION.sub("", error.msg))
+        raise DocumentError(name, f"it is not XML: {message}", line=first_line - 1 + max(line, 1)) from error
     except ValueError as error:
         raise DocumentError(name, f"it is not XML: {error}") from error
     if root.getroottree().docinfo.doctype:
@@ -195,17 +200,22 @@ def _schema() -> etree.XMLSchema:
 
 
 @cache
-def _known_words() -> frozenset[str]:
+def _known_words(*, optional_only: bool = False) -> tuple[str, ...]:
+    """The names of the schema's elements, in its order."""
     elements = etree.fromstring(_schema_text()).iter("{http://www.w3.org/2001/XMLSchema}element")
-    return frozenset(str(element.get("name")) for element in elements)
+    found = (str(word.get("name")) for word in elements if not optional_only or word.get("minOccurs") == "0")
+    return tuple(dict.fromkeys(found))
 
 
+# What the schema's simple types want, and the facets by which libxml2 names them.
+_BOOLEAN, _DOMAIN_ID, _EXPRESSION = "true or false", "a whole number from 0 to 2147483647", "an expression such as *"
 _WANTED = {
-    "Boolean": "true or false",
-    "DomainId": "a whole number from 0 to 2147483647",
-    "Expression": "an expression such as Square or *, not nothing",
+    "type 'Boolean'": _BOOLEAN,
+    "type 'DomainId'": _DOMAIN_ID,
+    "facet 'pattern'": _BOOLEAN,
+    "facet 'maxInclusive'": _DOMAIN_ID,
+    "facet 'minLength'": _EXPRESSION,
 }
-_TYPE = re.compile(r"type '(\w+)'")
 _SET = re.compile(r"The value '(.*)' is not an element of the set \{(.*)\}", re.DOTALL)
 _EXPECTED = re.compile(r"Expected is (?:one of )?\(([^)]*)\)")
 _QUOTED_ELEMENT = re.compile(r"\AElement '[^']*'(?:, attribute '[^']*')?: ")
@@ -221,19 +231,27 @@ def _schema_error(root: Node, log: Iterable[etree._LogEntry]) -> DocumentError:
     if found := _SET.search(messages):
         valid = re.findall(r"'([^']*)'", found.group(2))
         return node.error(f"<{node.tag}> is {shown(found.group(1))}", remedy=did_you_mean(found.group(1), valid))
-    if (of_type := _TYPE.search(messages)) and of_type.group(1) in _WANTED:
-        return node.error(f"<{node.tag}> is {shown(node.text)}", remedy=f"expected {_WANTED[of_type.group(1)]}")
+    if wanted := next((wanted for word, wanted in _WANTED.items() if word in messages), ""):
+        return node.error(f"<{node.tag}> is {shown(node.text)}", remedy=f"expected {wanted}")
     expected = _EXPECTED.search(messages)
     words = [word.strip() for word in expected.group(1).split(",")] if expected else []
     if "Missing child element" in messages:
-        missing = " or ".join(f"<{word}>" for word in words)
+        needed = [word for word in words if word not in _known_words(optional_only=True)]
+        missing = " or ".join(f"<{word}>" for word in needed or words)
         return node.error(f"<{node.tag}> is not complete", remedy=f"add {missing}" if missing else "")
     if "This element is not expected" in messages:
-        near = did_you_mean(node.tag, words or sorted(_known_words()))
-        return node.error(f"<{node.tag}> may not stand here, or not again", remedy=near)
+        number = _NUMBER.search(entries[0].path or "")
+        if number and int(number.group(1)) > 1 and node.tag not in words:
+            return node.error(f"<{node.tag}> stands there a second time", remedy="keep one")
+        return node.error(f"<{node.tag}> may not stand here", remedy=did_you_mean(node.tag, words or _known_words()))
+    if "validation root" in messages:
+        return node.error(f"<{node.tag}> is no document", remedy="it begins with <dds>, without a namespace")
+    if "Character content" in messages:
+        return node.error(f"<{node.tag}> has text beside its elements")
     return node.error(_QUOTED_ELEMENT.sub("", (entries[0].message or "").strip()).rstrip("."))
 
 
+_NUMBER = re.compile(r"\[(\d{1,6})\]\Z")
 _STEP = re.compile(r"(?:\*|([^\[]+))(?:\[(\d+)\])?")
 
 
