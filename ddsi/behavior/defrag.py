@@ -38,7 +38,8 @@ class Keep(Enum):
 class PartialSample:
     """A sample of which some fragments are here.  Fragment numbers count from 1.
 
-    ``reader_id``: the reader that it is for, UNKNOWN (zeros) for all.
+    ``reader_id``: the reader that it is for, UNKNOWN (zeros) for all.  ``is_sealed``: what is joined is the protected
+    form of the sample, which can be opened only when it is complete.
     """
 
     __slots__ = (
@@ -47,16 +48,20 @@ class PartialSample:
         "asked_at",
         "fragment_size",
         "inline_qos",
+        "is_sealed",
         "last_arrival",
         "octets",
         "reader_id",
         "timestamp",
     )
 
-    def __init__(self, sample_size: int, fragment_size: int, reader_id: bytes = _TO_ALL) -> None:
+    def __init__(
+        self, sample_size: int, fragment_size: int, reader_id: bytes = _TO_ALL, *, is_sealed: bool = False
+    ) -> None:
         self.octets = bytearray(sample_size)
         self.fragment_size = fragment_size
         self.reader_id = reader_id
+        self.is_sealed = is_sealed
         self._missing_count = -(-sample_size // fragment_size)
         self._arrived = bytearray(self._missing_count)
         self.inline_qos: object | None = None
@@ -76,6 +81,10 @@ class PartialSample:
     @property
     def is_complete(self) -> bool:
         return self._missing_count == 0
+
+    def is_like(self, sample_size: int, fragment_size: int, *, is_sealed: bool) -> bool:
+        """May fragments that say so belong to it?"""
+        return (len(self.octets), self.fragment_size, self.is_sealed) == (sample_size, fragment_size, is_sealed)
 
     def is_silent(self, now: float, *, may_repeat: bool) -> bool:
         """Is it time to ask for what is missing: nothing has come for a moment, nor is an answer under way?"""
@@ -160,20 +169,22 @@ class Defragmenter:
         count: int,
         fragments: bytes | memoryview,
         now: float,
+        is_sealed: bool = False,
     ) -> PartialSample | None:
         """Fragments of one sample: the sample as far as it is here now, or None when they were refused.
 
-        When it :attr:`~PartialSample.is_complete` it is not held any more.
+        When it :attr:`~PartialSample.is_complete` it is not held any more.  Sealed fragments and opened ones are never
+        joined.
         """
         sample = self._sample_for(sequence_number, reader_id)
-        if sample is not None and (len(sample.octets) != sample_size or sample.fragment_size != fragment_size):
+        if sample is not None and not sample.is_like(sample_size, fragment_size, is_sealed=is_sealed):
             self.dropped += 1
             if self.keep is not Keep.NEWEST:
                 return None  # a writer that contradicts itself: what came first is believed
             self._remove(sequence_number, sample)
             sample = None
         if sample is None:
-            sample = self._start(sequence_number, reader_id, sample_size, fragment_size)
+            sample = self._start(sequence_number, reader_id, sample_size, fragment_size, is_sealed=is_sealed)
             if sample is None:
                 return None
         sample.last_arrival = now
@@ -227,7 +238,9 @@ class Defragmenter:
             sample.reader_id = _TO_ALL
         return sample
 
-    def _start(self, number: int, reader_id: bytes, sample_size: int, fragment_size: int) -> PartialSample | None:
+    def _start(
+        self, number: int, reader_id: bytes, sample_size: int, fragment_size: int, *, is_sealed: bool
+    ) -> PartialSample | None:
         octets = sample_size - (-sample_size // fragment_size)
         if octets > self._budget.max_octets:
             self.dropped += 1
@@ -239,7 +252,7 @@ class Defragmenter:
             heaviest = self._budget.heaviest()
             if not heaviest._give_way(number if heaviest is self else None):
                 return None
-        sample = PartialSample(sample_size, fragment_size, bytes(reader_id))
+        sample = PartialSample(sample_size, fragment_size, bytes(reader_id), is_sealed=is_sealed)
         self._partial.setdefault(number, {})[sample.reader_id] = sample
         self._count += 1
         self.octets += sample.memory

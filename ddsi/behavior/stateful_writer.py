@@ -44,7 +44,7 @@ class StatefulWriter:
         fragment_octets: int,
         unacknowledged_octets_max: int,
     ) -> None:
-        """``fragment_octets``: payloads larger than this travel in fragments of this size."""
+        """``fragment_octets``: payloads larger than this travel in fragments of this size, which may change later."""
         self.guid = guid
         self.qos = qos
         self.cache = WriterHistoryCache(qos)
@@ -123,6 +123,7 @@ class StatefulWriter:
             destination=destination,
             related=related,
         )
+        change.fragment_octets = self.fragment_octets
         cache.add(change)
         if lifespan != math.inf and kind is ChangeKind.ALIVE:  # DDS 1.4 §2.2.3.16: data expires, not the end of it
             change.expiry = now + lifespan
@@ -223,7 +224,7 @@ class StatefulWriter:
         """The first transmission of a change, or the next part of it; nothing when it has to wait."""
         if self._window_is_full() or self._pace_due != math.inf:
             return []
-        if len(change.payload) > self.fragment_octets:
+        if len(change.payload) > change.fragment_octets:
             return self._send_fragments(change, now)
         self._sent(change)
         return [SendData(change)]
@@ -236,7 +237,7 @@ class StatefulWriter:
         """
         first = self._next_unsent_fragment
         last_of_all = self.fragment_count(change)
-        last = min(first + max(self.window.octets // self.fragment_octets, 1) - 1, last_of_all)
+        last = min(first + max(self.window.octets // change.fragment_octets, 1) - 1, last_of_all)
         out: list[WriterTransmission] = [SendFragments(change, first, last)]
         if last == last_of_all:
             self._sent(change)
@@ -249,10 +250,10 @@ class StatefulWriter:
         return out
 
     def fragment_count(self, change: CacheChange) -> int:
-        return -(-len(change.payload) // self.fragment_octets)
+        return -(-len(change.payload) // change.fragment_octets)
 
     def _whole_change(self, change: CacheChange, proxy: ReaderProxy) -> list[WriterTransmission]:
-        if len(change.payload) <= self.fragment_octets:
+        if len(change.payload) <= change.fragment_octets:
             return [SendData(change, proxy)]
         return [SendFragments(change, 1, self.fragment_count(change), proxy)]
 
@@ -425,10 +426,10 @@ class StatefulWriter:
     def _resend(self, change: CacheChange, proxy: ReaderProxy, budget: int) -> tuple[list[WriterTransmission], int]:
         """One change to one reader, or the beginning of it that fits the budget: a NACK_FRAG asks for the rest."""
         size = len(change.payload)
-        if size <= self.fragment_octets:
+        if size <= change.fragment_octets:
             return [SendData(change, proxy)], size
-        last = min(max(budget // self.fragment_octets, 1), self.fragment_count(change))
-        return [SendFragments(change, 1, last, proxy)], last * self.fragment_octets
+        last = min(max(budget // change.fragment_octets, 1), self.fragment_count(change))
+        return [SendFragments(change, 1, last, proxy)], last * change.fragment_octets
 
     def receive_nack_frag(
         self, proxy: ReaderProxy, sequence_number: int, missing: NumberSet, count: int, now: float
@@ -444,7 +445,7 @@ class StatefulWriter:
             return list(gap_for(self.cache, proxy, [sequence_number], self._gap_end(proxy)))
         unsent = self._next_unsent_fragment if sequence_number == self.next_unsent_sn else None
         end = unsent if unsent is not None else self.fragment_count(change) + 1
-        budget = max(max(self.window.octets, _LEAST_REPAIR_OCTETS) // self.fragment_octets, 1)
+        budget = max(max(self.window.octets, _LEAST_REPAIR_OCTETS) // change.fragment_octets, 1)
         wanted = [number for number in missing if 1 <= number < end][:budget]
         if not wanted:
             return []

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from ..behavior.defrag import PartialSample
 from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.writer_proxy import WriterProxy
 from ..discovery.participant_proxy import ParticipantProxy
@@ -49,9 +50,7 @@ _UNKNOWN_ID = bytes(4)
 _NUMBERS_END = 1 << 62
 _CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
 _UNKNOWN_PREFIX = bytes(12)
-_CLEAR = Protection.NONE
-# Inside a SEC_ envelope, by how the message around it arrived.
-_IN_ENVELOPE = (Protection.SUBMESSAGE, Protection.SUBMESSAGE | Protection.MESSAGE)
+_CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
 
 
 class Incoming:
@@ -145,7 +144,7 @@ class Inbound:
                 self._undecodable(incoming, decoded)
                 return
             view = memoryview(decoded)
-            incoming.protection = Protection.MESSAGE
+            incoming.protection = _IN_MESSAGE
         self._submessages(incoming, view, 20)
 
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
@@ -193,13 +192,13 @@ class Inbound:
         if not incoming.is_for_us:
             return
         outside = incoming.protection
-        if Protection.SUBMESSAGE in outside:
+        if outside & _IN_ENVELOPE:
             raise MalformedMessage("an envelope within an envelope", element="SEC_PREFIX")
         decoded = self._hooks.decode_submessage(octets, GuidPrefix(incoming.prefix))
         if isinstance(decoded, Outcome):
             self._undecodable(incoming, decoded)
             return
-        incoming.protection = _IN_ENVELOPE[outside]
+        incoming.protection = outside | _IN_ENVELOPE
         self._submessages(incoming, memoryview(decoded), 0)
         incoming.protection = outside
 
@@ -227,7 +226,7 @@ class Inbound:
         prefix = bytes(info.guid_prefix)
         if prefix != incoming.prefix:
             # Protection proves who sent it.  Nobody may speak under its cover for somebody else.
-            if Protection.SUBMESSAGE in incoming.protection:
+            if incoming.protection & _IN_ENVELOPE:
                 raise MalformedMessage("another source within an envelope", element="INFO_SRC", offset=raw.offset)
             incoming.protection = _CLEAR
         incoming.prefix = prefix
@@ -286,6 +285,9 @@ class Inbound:
             return
         if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        if data.non_standard_payload and not self._hooks.protects_payload(remote.guid):
+            self._not_cdr(incoming, remote, data)
             return
         payload: Octets | Outcome = data.serialized_payload
         if len(data.serialized_payload):
@@ -408,11 +410,25 @@ class Inbound:
             return
         if not self._is_wanted(incoming, remote, data):
             return
-        fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload)
+        is_protected = self._hooks.protects_payload(remote.guid)
+        if data.non_standard_payload and not is_protected:
+            self._not_cdr(incoming, remote, data)
+            return
+        # Protection makes a run longer than padding does.  One that was not made longer is part of a sample that was
+        # protected as a whole (OpenDDS): it cannot be opened before the last fragment is here.
+        is_sealed = is_protected and len(data.serialized_payload) < data.run_length + 4
+        fragments: Octets | Outcome = data.serialized_payload
+        if not is_sealed:
+            fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload)
         if isinstance(fragments, Outcome):
             self._undecodable(incoming, fragments)
             return
-        self._add_fragments(incoming, remote, data, memoryview(fragments))
+        self._add_fragments(incoming, remote, data, memoryview(fragments), is_sealed=is_sealed)
+
+    def _not_cdr(self, incoming: Incoming, remote: RemoteWriter, data: Data | DataFrag) -> None:
+        """Flag N.  RTPS 2.5 §8.3.8.2: only who has agreed on such a payload can read it."""
+        self._engine.dropped(DropReason.UNSUPPORTED, incoming.source, "a payload that is no CDR")
+        self._nothing(incoming, remote, data.reader_id, data.writer_sn)
 
     def _is_wanted(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag) -> bool:
         """Does any reader lack this sample?  Each is told that it exists."""
@@ -422,7 +438,9 @@ class Inbound:
                 wanted = reader.fragment_received(proxy, data.writer_sn, incoming.now) or wanted
         return wanted
 
-    def _add_fragments(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, fragments: memoryview) -> None:
+    def _add_fragments(
+        self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, fragments: memoryview, *, is_sealed: bool
+    ) -> None:
         if len(fragments) < data.run_length:
             raise MalformedMessage(f"{len(fragments)} octets of {data.run_length}", element="DATA_FRAG")
         defragmenter = remote.defragmenter
@@ -436,6 +454,7 @@ class Inbound:
             count=data.fragments_in_submessage,
             fragments=fragments,
             now=incoming.now,
+            is_sealed=is_sealed,
         )
         if defragmenter.dropped != dropped:
             self._engine.dropped(DropReason.TABLE_FULL_FRAGMENTS, incoming.source)
@@ -446,10 +465,20 @@ class Inbound:
             sample.inline_qos = data.inline_qos or sample.inline_qos
             sample.timestamp = incoming.timestamp
         if sample.is_complete:
-            timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp
-            inline = _InlineQos.read(sample.inline_qos)
-            self._joined(incoming, remote, sample.reader_id, data.writer_sn, sample.octets, inline, is_key=data.is_key)
-            incoming.timestamp = timestamp
+            self._sample_complete(incoming, remote, data, sample)
+
+    def _sample_complete(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, sample: PartialSample) -> None:
+        octets: bytes | bytearray = sample.octets
+        if sample.is_sealed:
+            payload = self._hooks.decode_payload(remote.guid, octets)
+            if isinstance(payload, Outcome):
+                self._undecodable(incoming, payload)
+                return
+            octets = bytes(payload)
+        timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp
+        inline = _InlineQos.read(sample.inline_qos)
+        self._joined(incoming, remote, sample.reader_id, data.writer_sn, octets, inline, is_key=data.is_key)
+        incoming.timestamp = timestamp
 
     # --- HEARTBEAT, GAP ----------------------------------------------------------------------------------
 

@@ -32,9 +32,9 @@ from ..messages.interpreter import InfoDestination
 from ..messages.packer import MessagePacker
 from ..serialization.parameter_id import ParameterId
 from ..serialization.parameter_list import ParameterList
-from ..spi import Octets, Parts, SecurityHooks
+from ..spi import Octets, Overhead, Parts, SecurityHooks
 from ..structure.cache_change import CacheChange, ChangeKind
-from ..structure.guid import EntityId, Guid, GuidPrefix
+from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from .effects import SendDatagram
 from .local_endpoints import LocalWriter
@@ -49,9 +49,9 @@ _FRAGMENT_COMPANY = 20 + 16 + 12 + 36 + 32
 _LARGEST_FRAGMENT = 65_000  # fragmentSize is a uint16, and a datagram ends at 65,507
 
 
-def fragment_octets_for(max_message_octets: int, configured: int | None, protection: int) -> int:
-    """The fragment size: as configured, else what fills a message beside its company and ``protection`` octets."""
-    room = max_message_octets - _FRAGMENT_COMPANY - protection
+def fragment_octets_for(max_message_octets: int, configured: int | None, added: Overhead) -> int:
+    """The fragment size: as configured, else what fills a message beside its company and what protection adds."""
+    room = max_message_octets - _FRAGMENT_COMPANY - added.payload - added.submessage - added.message
     return max(min(configured or room, room, _LARGEST_FRAGMENT) & ~7, 8)
 
 
@@ -62,20 +62,28 @@ class Outbound:
         self,
         header: bytes,
         max_message_octets: int,
+        fragment_size: int | None,
         hooks: SecurityHooks,
         emit: Callable[[SendDatagram], None],
     ) -> None:
         self._header = header
         self._max_message_octets = max_message_octets
+        self._fragment_size = fragment_size
         self._hooks = hooks
         self._emit = emit
         self._dirty_writers: dict[Guid, LocalWriter] = {}
         # Messages to one participant, by sending entity, prefix and locators.
         self._directed: dict[tuple[bytes, bytes, tuple[Locator, ...]], tuple[MessagePacker, Guid]] = {}
 
-    def new_packer(self, destination: GuidPrefix | None = None) -> MessagePacker:
-        head = self._header if destination is None else self._header + InfoDestination(destination).encode()
-        return MessagePacker(head, self._max_message_octets)
+    def new_packer(self) -> MessagePacker:
+        """For a writer's messages to all its readers, of whom there is none yet: see :meth:`receivers_changed`."""
+        return MessagePacker(self._header, self._max_message_octets)
+
+    def receivers_changed(self, writer: LocalWriter) -> None:
+        """Protection may grow with the number of receivers, and messages and fragments have to leave it room."""
+        added = self._hooks.overhead(writer.guid, writer.receivers)
+        writer.packer.capacity = self._max_message_octets - added.message
+        writer.behavior.fragment_octets = fragment_octets_for(self._max_message_octets, self._fragment_size, added)
 
     @property
     def is_idle(self) -> bool:
@@ -132,7 +140,7 @@ class Outbound:
         self._append(writer, reader, data.encode(), change.source_timestamp)
 
     def _send_fragment(self, writer: LocalWriter, change: CacheChange, number: int, reader: ReaderProxy | None) -> None:
-        size = writer.behavior.fragment_octets
+        size = change.fragment_octets
         octets = memoryview(change.payload)[(number - 1) * size : number * size]
         payload = self._hooks.encode_payload(writer.guid, octets)
         padding = _PADDING[len(payload) & 3]
@@ -171,6 +179,8 @@ class Outbound:
 
     def _append_to_group(self, writer: LocalWriter, parts: Parts, ticks: int | None) -> None:
         """``ticks``: the sample's timestamp; None for what is no sample."""
+        if not parts:
+            return  # it must not leave
         packer = writer.packer
         size = sum(map(len, parts))
         if not packer.fits(size + 12):
@@ -202,11 +212,15 @@ class Outbound:
     def _append_directed(
         self, sender: Guid, receiver: Guid, locators: tuple[Locator, ...], parts: Parts, ticks: int | None
     ) -> None:
+        if not parts:
+            return  # it must not leave
         prefix = receiver.prefix
         key = (sender[12:], prefix, locators)
         held = self._directed.get(key)
         if held is None:
-            held = self._directed[key] = (self.new_packer(prefix), receiver)
+            capacity = self._max_message_octets - self._hooks.overhead(sender, (receiver,)).message
+            packer = MessagePacker(self._header + InfoDestination(prefix).encode(), capacity)
+            held = self._directed[key] = (packer, receiver)
         packer = held[0]
         size = sum(map(len, parts))
         if not packer.fits(size + 12):
@@ -243,6 +257,8 @@ class Outbound:
             return
         octets = fast.heartbeat(_UNKNOWN_ID, writer.guid[12:], item.first, item.last, item.count, final=item.final)
         parts = self._hooks.encode_submessage(writer.guid, writer.receivers, (octets,))
+        if not parts:
+            return
         size = sum(map(len, parts))
         if not writer.packer.fits(size):
             self._emit_group(writer)
@@ -254,9 +270,11 @@ class Outbound:
     def _emit_message(self, packer: MessagePacker, receivers: tuple[Guid, ...], locators: tuple[Locator, ...]) -> None:
         if packer.is_empty:
             return
-        parts = packer.take()
+        parts: Parts = packer.take()
         if locators:
-            self._emit(SendDatagram(locators, self._hooks.encode_message(receivers, parts)))
+            parts = self._hooks.encode_message(receivers, parts)
+            if parts:
+                self._emit(SendDatagram(locators, parts))
 
 
 def _key_payload(payload: Octets) -> Octets:

@@ -153,7 +153,7 @@ class Participant:
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
         self._max_message_octets = setup.max_message_octets
         emit = self._emit_recorded if self.recorder.is_on else self._effects.append
-        self.outbound = Outbound(header, setup.max_message_octets, hooks, emit)
+        self.outbound = Outbound(header, setup.max_message_octets, setup.config.fragment_size, hooks, emit)
         self.inbound = Inbound(self)
         self.matchmaker = Matchmaker(self)
         self.liveliness = Liveliness(self)
@@ -464,6 +464,7 @@ class Participant:
     def receivers_changed(self, writer: LocalWriter) -> None:
         """A remote reader was matched with the writer, or is no more."""
         writer.receivers = tuple(writer.behavior.readers)
+        self.outbound.receivers_changed(writer)
 
     def writer_answers(self, writer: LocalWriter, transmissions: Sequence[WriterTransmission]) -> None:
         """A writer decided to send these; its timer may have moved and somebody may wait for its progress."""
@@ -616,14 +617,11 @@ class Participant:
 
     def add_writer(self, data: DiscoveredWriterData, *, filters: bool = False) -> LocalWriter:
         """A writer in our tables, announced by nobody and matched with nobody."""
-        overhead = self.hooks.overhead(data.guid, ())
         behavior = (FilteringWriter if filters else StatefulWriter)(
             data.guid,
             data.qos,
             fragment_octets=fragment_octets_for(
-                self._max_message_octets,
-                self.config.fragment_size,
-                overhead.payload + overhead.submessage + overhead.message,
+                self._max_message_octets, self.config.fragment_size, self.hooks.overhead(data.guid, ())
             ),
             unacknowledged_octets_max=self.config.unacknowledged_octets,
         )

@@ -15,14 +15,17 @@ __all__ = ["MessagePacker"]
 
 
 class MessagePacker:
-    """The message under construction.  ``head`` is its RTPS header, with an INFO_DST behind it where there is one."""
+    """The message under construction.  ``head`` is its RTPS header, with an INFO_DST behind it where there is one.
 
-    __slots__ = ("_capacity", "_head", "octets", "parts", "timestamp")
+    ``capacity``: octets that it may have; it may change between two messages.
+    """
+
+    __slots__ = ("_head", "capacity", "octets", "parts", "timestamp")
 
     def __init__(self, head: bytes, capacity: int) -> None:
         assert len(head) >= HEADER_LENGTH
         self._head = head
-        self._capacity = capacity
+        self.capacity = capacity
         self.parts: list[Octets] = [head]
         self.octets = len(head)
         self.timestamp = -1  # the source timestamp (ticks) that the last INFO_TS set; -1: none yet
@@ -33,7 +36,7 @@ class MessagePacker:
 
     def fits(self, octets: int) -> bool:
         """Is there room for so many more?  A message without submessages takes anything."""
-        return self.octets + octets <= self._capacity or len(self.parts) == 1
+        return self.octets + octets <= self.capacity or len(self.parts) == 1
 
     def add(self, parts: Sequence[Octets], octets: int) -> None:
         self.parts.extend(parts)

@@ -24,7 +24,7 @@ from ..structure.discovered import (
 )
 from ..structure.guid import EntityId, Guid, GuidPrefix
 from ..structure.qos_policies import Properties
-from .outcomes import Admission, Outcome, Overhead, Protection
+from .outcomes import Admission, Outcome, Overhead
 
 __all__ = [
     "Announcement",
@@ -249,9 +249,10 @@ class SecurityHooks(Protocol):
         """
         ...
 
-    def admits(self, sender: bytes, protection: Protection) -> bool:
+    def admits(self, sender: bytes, protection: int) -> bool:
         """May a submessage of this remote writer or reader (the 16 octets of its Guid) be acted upon, having come so?
 
+        ``protection`` holds flags of :class:`Protection`, as a plain number, which is combined much faster.
         Asked for every submessage of an endpoint that is matched; and for SPDP in clear of a participant that is known,
         whose announcement or goodbye is not heeded when this is False: an authenticated participant speaks of itself
         on the secure topic only (§7.4.1.6).  On the path of every sample: it must be quick.

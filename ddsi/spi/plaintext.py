@@ -12,7 +12,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid, GuidPrefix
 from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, Parts, ProtectedEndpoint
-from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead, Protection
+from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
 
 __all__ = ["PLAINTEXT", "Plaintext"]
 
@@ -103,7 +103,7 @@ class Plaintext:
     def protects_payload(self, writer: Guid) -> bool:
         return False
 
-    def admits(self, sender: bytes, protection: Protection) -> bool:
+    def admits(self, sender: bytes, protection: int) -> bool:
         return True
 
 

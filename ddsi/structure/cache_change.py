@@ -34,12 +34,14 @@ class CacheChange:
     ``key`` is the instance's key in the canonical form (see ``xtypes``), empty for keyless topics.
     ``source_timestamp`` counts ticks (2^-32 s since 1970).  ``destination`` is the participant or reader that
     the change is meant for, GUID_UNKNOWN for everybody (the filtered path; DDS-Security 1.1 §7.4.4.4).
-    ``related`` is who and which sample this one answers: PID_RELATED_SAMPLE_IDENTITY's (Guid, number).
+    ``fragment_octets`` is how large its writer cuts the fragments of a change that is too large for one message; it stays
+    so, whatever size newer changes get.  ``related`` is who and which sample this one answers: PID_RELATED_SAMPLE_IDENTITY's (Guid, number).
     """
 
     __slots__ = (
         "destination",
         "expiry",
+        "fragment_octets",
         "key",
         "key_hash",
         "kind",
@@ -74,6 +76,7 @@ class CacheChange:
         self.destination = destination
         self.related = related
         self.expiry = expiry
+        self.fragment_octets = 0
 
     def __repr__(self) -> str:
         return f"<CacheChange {self.kind.name} {self.writer_guid}#{self.sequence_number}, {len(self.payload)} octets>"

@@ -25,11 +25,12 @@ def add(
     size: int = 10,
     reader: bytes = TO_ALL,
     now: float = 0.0,
+    sealed: bool = False,
 ) -> PartialSample | None:
     """One fragment of ``size`` octets, of a sample of ``of`` fragments, each filled with its own number."""
     return defrag.add(
         number, reader, sample_size=of * size, fragment_size=size, first=fragment, count=1,
-        fragments=bytes((fragment,)) * size, now=0.0,
+        fragments=bytes((fragment,)) * size, now=now, is_sealed=sealed,
     )  # fmt: skip
 
 
@@ -243,6 +244,17 @@ def test_a_writer_that_is_gone_gives_everything_back() -> None:
     one.close()
     assert (len(one), budget.octets) == (0, other.octets)
     assert budget.heaviest() is other
+
+
+def test_what_is_sealed_and_what_was_opened_are_never_joined() -> None:
+    """Else whoever has no key could put a piece of his own into a sample that is protected fragment by fragment."""
+    for first in (True, False):
+        defrag = defragmenter()
+        assert add(defrag, 1, 1, of=2, sealed=first) is not None
+        assert add(defrag, 1, 2, of=2, sealed=not first) is None
+        sample = add(defrag, 1, 2, of=2, sealed=first)
+        assert sample is not None
+        assert (sample.is_complete, sample.is_sealed) == (True, first)
 
 
 @given(

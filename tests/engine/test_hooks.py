@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -35,7 +36,7 @@ from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReade
 from ddsi.structure.errors import NotAllowedBySecurity
 from ddsi.structure.guid import Guid, GuidPrefix
 from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import KeepAll, Reliable
+from ddsi.structure.qos_policies import KeepAll, Reliable, TransientLocal
 from ddsi.structure.status import SecurityRefused
 from ddsi.trace.reasons import DropReason
 
@@ -293,8 +294,8 @@ class Masking(Hooks):
     def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
         return Overhead(submessage=20)
 
-    def admits(self, sender: bytes, protection: Protection) -> bool:
-        return Protection.SUBMESSAGE in protection or Guid(sender).entity_id.is_builtin
+    def admits(self, sender: bytes, protection: int) -> bool:
+        return bool(protection & Protection.SUBMESSAGE) or Guid(sender).entity_id.is_builtin
 
 
 def _inverted(octets: Octets) -> bytes:
@@ -390,6 +391,182 @@ def test_a_whole_message_that_does_not_decode_is_dropped() -> None:
         domain.run(2)
         assert len(reader.taken) == expected
         assert (b.engine.drops[DropReason.NOT_FOR_US] > 0) is (expected == 0)
+
+
+def watched(domain: Domain) -> list[tuple[bytes, bytes]]:
+    """Every datagram from here on, with its sender's prefix."""
+    seen: list[tuple[bytes, bytes]] = []
+    domain.network.watch = lambda sender, octets: seen.append((sender, octets))
+    return seen
+
+
+def test_what_must_not_leave_is_not_sent_in_any_form() -> None:
+    """The hooks have no key for it: neither the submessage, nor a message without it."""
+
+    class Silent(Masking):
+        is_silent = False
+
+        def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+            if self.is_silent and not sender.entity_id.is_builtin:
+                return ()
+            return super().encode_submessage(sender, receivers, submessage)
+
+    domain, a, b = secured(Silent)
+    writer, reader = a.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 1)
+    domain.run(1)
+    hooks = a.engine.hooks
+    assert isinstance(hooks, Silent)
+    hooks.is_silent = True
+    seen = watched(domain)
+    for size in (3, 10_000):
+        writer.write(size)
+    writer.end(ChangeKind.NOT_ALIVE_DISPOSED)
+    domain.run(1)
+    assert not [octets for sender, octets in seen if sender == a.guid.prefix and writer.guid[12:] in octets]
+    hooks.is_silent = False
+    assert domain.run_until(lambda: len(reader.session(writer.guid).numbers) == 3, 20), "and later it is repaired"
+
+
+def test_a_message_that_must_not_leave_is_not_sent() -> None:
+    class Mute(Hooks):
+        is_mute = False
+
+        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+            return () if self.is_mute else message
+
+    domain, a, b = secured(Mute)
+    writer, reader = a.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 1)
+    hooks = a.engine.hooks
+    assert isinstance(hooks, Mute)
+    hooks.is_mute = True
+    seen = watched(domain)
+    writer.write()
+    domain.run(0.5)
+    assert not [octets for sender, octets in seen if sender == a.guid.prefix and writer.guid[12:] in octets]
+    hooks.is_mute = False
+    assert domain.run_until(lambda: len(reader.taken) == 1, 20)
+
+
+@pytest.mark.parametrize("receivers", [1, 12])
+def test_messages_and_fragments_leave_room_for_what_each_receiver_adds(receivers: int) -> None:
+    """DDS-Security 1.1 §8.5.1.9: with origin authentication each receiver has a MAC of 20 octets, at both levels."""
+
+    class Costly(Masking):
+        def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+            return Overhead(submessage=20 + 20 * len(receivers), message=28 + 20 * len(receivers))
+
+        def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+            parts = super().encode_submessage(sender, receivers, submessage)
+            if sender.entity_id.is_builtin:
+                return parts
+            macs = 20 * len(receivers)
+            return (*parts[:-1], b"\x32\x01" + (4 + macs).to_bytes(2, "little") + bytes(macs) + b"stop")
+
+        def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+            size = int.from_bytes(protected[10:12], "little")
+            return bytes(protected[12 : 12 + size])
+
+        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+            return (
+                *message,
+                b"\x34\x01" + (24 + 20 * len(receivers)).to_bytes(2, "little"),
+                bytes(24 + 20 * len(receivers)),
+            )
+
+    domain = Domain()
+    a = domain.node(make_hooks=Costly)
+    others = [domain.node(make_hooks=Costly) for _ in range(receivers)]
+    writer = a.writer("Square", RELIABLE)
+    readers = [node.reader("Square", RELIABLE) for node in others]
+    assert domain.run_until(domain.all_matched, 2)
+    seen = watched(domain)
+    for size in (3, 700, 900, 1003, 1300, 10_003, *[20] * 50):
+        writer.write(size)
+    assert domain.run_until(lambda: all(len(reader.taken) == 56 for reader in readers), 5)
+    sizes = [len(octets) for sender, octets in seen if sender == a.guid.prefix]
+    assert 1300 < max(sizes) <= 1452
+
+
+def test_fragments_of_one_sample_keep_their_size_when_receivers_come() -> None:
+    """A reader that has some of them could not join them with others."""
+
+    class Growing(Hooks):
+        def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+            return Overhead(message=200 * len(receivers))
+
+    domain, a, b = secured(Growing)
+    writer, reader = a.writer("Square", RELIABLE | Qos(durability=TransientLocal())), b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 1)
+    before = writer.local.behavior.fragment_octets
+    domain.network.conditions = replace(domain.network.conditions, loss=0.5)
+    for _ in range(5):
+        writer.write(20_000)
+    domain.run(0.01)
+    c = domain.node(make_hooks=Growing)
+    late = c.reader("Square", RELIABLE | Qos(durability=TransientLocal()))
+    domain.network.conditions = replace(domain.network.conditions, loss=0.1)
+    assert domain.run_until(lambda: len(reader.taken) == len(late.taken) == 5, 60)
+    assert writer.local.behavior.fragment_octets == before - 200
+    assert b.engine.drops[DropReason.TABLE_FULL_FRAGMENTS] == 0
+
+
+class Sealing(Masking):
+    """Payloads are inverted, and 40 octets longer: of each run of fragments, or of a whole sample before it is cut."""
+
+    def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
+        return payload if writer.entity_id.is_builtin else _inverted(payload) + bytes(40)
+
+    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        if writer.entity_id.is_builtin:
+            return payload
+        return _inverted(payload[:-40]) if bytes(payload[-40:]) == bytes(40) else Rejected("the MAC is wrong")
+
+    def protects_payload(self, writer: Guid) -> bool:
+        return not writer.entity_id.is_builtin
+
+    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        return Overhead(payload=40, submessage=20)
+
+
+class SealingWhole(Sealing):
+    """As OpenDDS does: what is cut into fragments is the protected form."""
+
+    def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
+        return payload  # see below: the sample is protected before it is written
+
+
+@pytest.mark.parametrize("size", [20, 5000, 9999])
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+def test_a_sample_may_be_protected_by_fragments_or_as_a_whole(size: int, loss: float) -> None:
+    domain = Domain()
+    a, whole, b = (domain.node(make_hooks=hooks) for hooks in (Sealing, SealingWhole, Sealing))
+    writer, other = a.writer("Square", RELIABLE), whole.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 2)
+    domain.network.conditions = replace(domain.network.conditions, loss=loss)
+    plain = b"\0\1\0\0" + bytes(range(256)) * 50
+    for _ in range(3):
+        a.engine.write(writer.local, ChangeKind.ALIVE, plain[:size], b"", domain.now)
+        sealed = _inverted(plain[:size]) + bytes(40)
+        whole.engine.write(other.local, ChangeKind.ALIVE, sealed, b"", domain.now)
+        a.pump()
+        whole.pump()
+    assert domain.run_until(lambda: len(reader.taken) == 6, 60)
+    assert {bytes(change.payload[:size]) for _, change in reader.taken} == {plain[:size]}
+
+
+def test_a_whole_sample_that_does_not_open_is_dropped_and_asked_for_again() -> None:
+    domain = Domain()
+    whole, b = domain.node(make_hooks=SealingWhole), domain.node(make_hooks=Sealing)
+    writer, reader = whole.writer("Square", RELIABLE), b.reader("Square", RELIABLE)
+    assert domain.run_until(domain.all_matched, 2)
+    whole.engine.write(writer.local, ChangeKind.ALIVE, bytes(5000) + b"not a MAC", b"", domain.now)
+    whole.pump()
+    domain.run(1)
+    assert reader.taken == []
+    assert b.engine.drops[DropReason.REJECTED_BY_SECURITY] > 1
 
 
 # --- messages to one participant ------------------------------------------------------------------------------------

@@ -44,8 +44,8 @@ class Wrapped(Plaintext):
     def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
         return bytes(protected[8:-8]) if self.content is None else self.content
 
-    def admits(self, sender: bytes, protection: Protection) -> bool:
-        self.asked.append((Guid(sender), protection))
+    def admits(self, sender: bytes, protection: int) -> bool:
+        self.asked.append((Guid(sender), Protection(protection)))
         return self.answer
 
 
@@ -188,7 +188,7 @@ def test_heartbeats_in_clear_do_not_make_an_authenticated_participant_begin_anew
     here, hooks, there = matched()
 
     class Lax(Wrapped):
-        def admits(self, sender: bytes, protection: Protection) -> bool:
+        def admits(self, sender: bytes, protection: int) -> bool:
             return sender[12:] != ids.SPDP_WRITER
 
     here.inbound._hooks = Lax()
