@@ -7,6 +7,7 @@ nor answered again and again.  Who was once authenticated is never taken for una
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Final
 
@@ -20,7 +21,7 @@ from .access_control_plugin import AccessControl
 from .announced import info, participant_refusal, token
 from .authentication_plugin import Authentication, AuthStatusKind, RemoteIdentity
 from .generic_message import GenericMessage
-from .handles import HandshakeHandle, IdentityHandle, Pending, PermissionsHandle
+from .handles import HandshakeHandle, IdentityHandle, Pending, PermissionsHandle, SharedSecretHandle
 from .handshake import Authenticated, Failed, Handshake, Output, Reported, Send, Work
 from .key_exchange import KeyExchange
 from .loading import Plugins
@@ -33,6 +34,7 @@ from .tokens import NIL, DataHolder
 __all__ = ["AdmissionDesk"]
 
 _MAX_BANNED: Final = 1024
+_RENEWAL_PAUSE_MAX_S: Final = 60.0
 _SECURE: Final = BuiltinEndpoints.PARTICIPANT_SECURE_WRITER
 
 
@@ -86,7 +88,7 @@ class AdmissionDesk:
         if difference:
             return self._unauthenticated(remote, f"its governance protects participants otherwise: {difference}")
         remote.handshake = self._handshake(remote, identity_token)
-        self._act(remote, remote.handshake.begin(now), now)
+        self._act(remote, remote.handshake, remote.handshake.begin(now), now)
         return self._answer(remote)
 
     def changed(self, data: DiscoveredParticipantData, now: float) -> Admission:
@@ -148,8 +150,22 @@ class AdmissionDesk:
 
     def receive(self, remote: RemoteParticipant, message: GenericMessage, now: float) -> None:
         """A message of the stateless topic."""
-        if remote.handshake is not None:
-            self._act(remote, remote.handshake.receive(message, now), now)
+        if remote.handshake is None:
+            return
+        if remote.handshake.is_begun_anew_by(message):
+            if remote.renewal is None:
+                if now < remote.next_renewal:
+                    return
+                remote.next_renewal = now + remote.renewal_pause_s
+                remote.renewal_pause_s = min(2 * remote.renewal_pause_s, _RENEWAL_PAUSE_MAX_S)
+                identity_token = token(remote.data.security_parameters, ParameterId.IDENTITY_TOKEN)
+                remote.renewal = self._handshake(remote, identity_token)
+                self._act(remote, remote.renewal, remote.renewal.begin(now), now)
+            self._act(remote, remote.renewal, remote.renewal.receive(message, now), now)
+            return
+        self._act(remote, remote.handshake, remote.handshake.receive(message, now), now)
+        if remote.renewal is not None:
+            self._act(remote, remote.renewal, remote.renewal.receive(message, now), now)
 
     def computed(self, effect: Compute, result: object, now: float) -> None:
         _, proceed = self._jobs.pop(effect.generation, (None, None))
@@ -158,32 +174,41 @@ class AdmissionDesk:
 
     def handle_timeout(self, now: float) -> None:
         for remote in list(self._remotes.values()):
-            if remote.handshake is not None and remote.handshake.next_deadline() <= now:
-                self._act(remote, remote.handshake.handle_timeout(now), now)
+            for handshake in (remote.handshake, remote.renewal):
+                if handshake is not None and handshake.next_deadline() <= now:
+                    self._act(remote, handshake, handshake.handle_timeout(now), now)
 
     def next_deadline(self) -> float:
         return min(
-            (remote.handshake.next_deadline() for remote in self._remotes.values() if remote.handshake is not None),
-            default=float("inf"),
+            (
+                handshake.next_deadline()
+                for remote in self._remotes.values()
+                for handshake in (remote.handshake, remote.renewal)
+                if handshake is not None
+            ),
+            default=math.inf,
         )
 
-    def _act(self, remote: RemoteParticipant, outputs: list[Output], now: float) -> None:
+    def _act(self, remote: RemoteParticipant, handshake: Handshake, outputs: list[Output], now: float) -> None:
         for output in outputs:
             match output:
                 case Send():
                     self._mailbox.post_handshake(remote, output)
                 case Work(job):
-                    self._compute(remote, job, lambda result, now: self._worked(remote, result, now))
+                    self._compute(remote, job, lambda result, now: self._worked(remote, handshake, result, now))
                 case Authenticated(handle):
-                    self._authenticated(remote, handle, now)
+                    self._authenticated(remote, handshake, handle, now)
                 case Reported(reason):
                     self._report(remote, reason)
+                case Failed() if handshake is remote.renewal:
+                    handshake.close()
+                    remote.renewal = None
                 case Failed(reason, _):
                     self._failed(remote, reason)
 
-    def _worked(self, remote: RemoteParticipant, result: object, now: float) -> None:
-        if remote.handshake is not None:
-            self._act(remote, remote.handshake.worked(result, now), now)
+    def _worked(self, remote: RemoteParticipant, handshake: Handshake, result: object, now: float) -> None:
+        if handshake in (remote.handshake, remote.renewal):  # else it was overtaken
+            self._act(remote, handshake, handshake.worked(result, now), now)
 
     def _compute(
         self, remote: RemoteParticipant, job: Callable[[], object], proceed: Callable[[object, float], None]
@@ -210,49 +235,68 @@ class AdmissionDesk:
 
     # --- permissions and keys ----------------------------------------------------------------------------
 
-    def _authenticated(self, remote: RemoteParticipant, handle: HandshakeHandle, now: float) -> None:
-        authentication, access = self._plugins.authentication, self._plugins.access_control
-        assert remote.handshake is not None
-        assert remote.handshake.remote_identity is not None
-        remote.shared_secret = authentication.get_shared_secret(handle)
-        result = access.validate_remote_permissions(
+    def _authenticated(
+        self, remote: RemoteParticipant, handshake: Handshake, handle: HandshakeHandle, now: float
+    ) -> None:
+        """The peer is who it says; what may it do?  After a renewal too, as its permissions may be others now."""
+        authentication = self._plugins.authentication
+        assert handshake.remote_identity is not None
+        shared_secret = authentication.get_shared_secret(handle)
+        result = self._plugins.access_control.validate_remote_permissions(
             authentication,
             self._own.identity,
-            remote.handshake.remote_identity,
+            handshake.remote_identity,
             token(remote.data.security_parameters, ParameterId.PERMISSIONS_TOKEN),
             authentication.get_authenticated_peer_credential_token(handle),
         )
-        if isinstance(result, Pending):
-            self._compute(remote, result.job, lambda result, now: self._permitted(remote, result, now))
-        else:
-            self._permitted(remote, result, now)
+        self._permitted(remote, handshake, shared_secret, result)
 
-    def _permitted(self, remote: RemoteParticipant, result: object, now: float) -> None:
-        if isinstance(result, Pending):
-            self._compute(remote, result.job, lambda result, now: self._permitted(remote, result, now))
-        elif isinstance(result, Refused):
-            self._refuse(remote, result.reason)
-        elif isinstance(result, PermissionsHandle):
-            remote.permissions = result
-            refusal = self._plugins.access_control.check_remote_participant(result, self._own.domain_id, remote.data)
-            if refusal is not None:
-                self._refuse(remote, refusal.reason)
-            else:
-                self._admit(remote)
+    def _permitted(
+        self, remote: RemoteParticipant, handshake: Handshake, shared_secret: SharedSecretHandle, result: object
+    ) -> None:
+        if handshake not in (remote.handshake, remote.renewal):
+            return
+        match result:
+            case Pending(job):
+                self._compute(
+                    remote, job, lambda result, _now: self._permitted(remote, handshake, shared_secret, result)
+                )
+            case Refused(reason):
+                self._refuse(remote, reason)
+            case PermissionsHandle():
+                refusal = self._plugins.access_control.check_remote_participant(
+                    result, self._own.domain_id, remote.data
+                )
+                if refusal is not None:
+                    self._refuse(remote, refusal.reason)
+                else:
+                    self._admit(remote, handshake, shared_secret, result)
 
-    def _admit(self, remote: RemoteParticipant) -> None:
-        assert remote.handshake is not None
-        assert remote.handshake.remote_identity is not None
-        assert remote.permissions is not None
-        assert remote.shared_secret is not None
-        remote.crypto = self._plugins.cryptographic.register_matched_remote_participant(
-            self._own.crypto, remote.handshake.remote_identity, remote.permissions, remote.shared_secret
+    def _admit(
+        self,
+        remote: RemoteParticipant,
+        handshake: Handshake,
+        shared_secret: SharedSecretHandle,
+        permissions: PermissionsHandle,
+    ) -> None:
+        assert handshake.remote_identity is not None
+        crypto = self._plugins.cryptographic.register_matched_remote_participant(
+            self._own.crypto, handshake.remote_identity, permissions, shared_secret
         )
-        remote.standing, remote.reason = Standing.ADMITTED, ""
+        subject = self._plugins.authentication.get_subject_name(handshake.remote_identity)
+        if handshake is remote.renewal:
+            self._return_credentials(remote)
+            remote.handshake, remote.renewal, remote.permissions = handshake, None, permissions
+            self._keys.renew(remote, crypto, shared_secret)
+            self._log(
+                LogLevel.NOTICE_LEVEL, f"participant {remote.guid}, {subject}, authenticated anew", "authenticated"
+            )
+        else:
+            remote.crypto, remote.shared_secret, remote.permissions = crypto, shared_secret, permissions
+            remote.standing, remote.reason = Standing.ADMITTED, ""
+            self._log(LogLevel.INFO_LEVEL, f"participant {remote.guid} is {subject}, authenticated", "authenticated")
+            self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
         self._changed()
-        subject = self._plugins.authentication.get_subject_name(remote.handshake.remote_identity)
-        self._log(LogLevel.INFO_LEVEL, f"participant {remote.guid} is {subject}, authenticated", "authenticated")
-        self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
 
     def _refuse(self, remote: RemoteParticipant, reason: str) -> None:
         """It may not join, or not any longer; and it will not be asked again under this Guid."""
@@ -271,6 +315,13 @@ class AdmissionDesk:
     def _release(self, remote: RemoteParticipant) -> None:
         """Wipe what can be wiped; the key that the two share goes last of the keys."""
         self._keys.forget(remote)
+        self._return_credentials(remote)
+        if remote.renewal is not None:
+            remote.renewal.close()
+            remote.renewal = None
+
+    def _return_credentials(self, remote: RemoteParticipant) -> None:
+        """What the plugins gave us when it authenticated."""
         if remote.permissions is not None:
             self._plugins.access_control.return_permissions_handle(remote.permissions)
             remote.permissions = None

@@ -10,7 +10,9 @@ the messages loses, repeats and reorders them, and anybody can write to it.  Fro
   so that a flood of bad messages costs little;
 * another request while the final is awaited is answered too, beside the first: requests are not signed, so neither
   of the two can be said to be the true one before its final comes (:data:`MAX_REPLIES`);
-* after :data:`LIMIT_S` it is given up and begun anew, later each time.
+* after :data:`LIMIT_S` it is given up and begun anew, later each time;
+* one that is done answers repeats and nothing else.  Who has lost his state begins another, beside the first, which
+  takes its place when it is done as well (:meth:`Handshake.is_begun_anew_by`).
 
 :data:`TRANSITIONS` is the whole machine; the rest of the file does what its actions say.  It knows no socket, clock or
 thread: inputs are calls, and each returns what is to be done.
@@ -237,6 +239,7 @@ class Handshake:
         self._message: GenericMessage | None = None  # being worked on
         self._tried = 0  # how many exchanges the final in work did not fit
         self._verified: DataHolder | None = None
+        self._request: DataHolder | None = None  # the one that our verified reply answered
 
     # --- inputs ------------------------------------------------------------------------------------------
 
@@ -260,6 +263,15 @@ class Handshake:
                 self._message = message
                 self._step(event, now)
         return self._drain()
+
+    def is_begun_anew_by(self, message: GenericMessage) -> bool:
+        """Does the peer, with whom all was done, want another handshake, as it does not know of this one any more?"""
+        if self.state is not State.AUTHENTICATED or len(message.message_data) != 1:
+            return False
+        token = message.message_data[0]
+        if message.message_class_id == AUTH_REQUEST:
+            return self._request is None and token != self._auth_request
+        return self._request is not None and self._event_of(token) is Event.REQUEST and token != self._request
 
     def worked(self, result: object, now: float) -> list[Output]:
         """The result of the job that a :class:`Work` asked for."""
@@ -308,6 +320,8 @@ class Handshake:
             case Action.MAKE_REQUEST:
                 self._make_request(now)
             case Action.MAKE_REPLY:
+                if self.state is State.REPLYING_AGAIN:
+                    self._be_deaf(now)
                 self._make_reply(now)
             case Action.VERIFY:
                 self._tried = 0
@@ -384,6 +398,7 @@ class Handshake:
         sent = Send(AUTH, step.message, related) if step.message is not None else None
         if self.state in (State.VERIFYING_REPLY, State.VERIFYING_FINAL):
             chosen = self._exchanges.pop(-1 - self._tried)
+            self._request = chosen.received if self.state is State.VERIFYING_FINAL else None
             self._forget_exchanges()
             self._exchanges.append(_Exchange(received, sent or chosen.sent, step.handle))
             self._verified = received
@@ -401,9 +416,12 @@ class Handshake:
         self._last_reason = ""
         self._out.append(Authenticated(self._exchanges[-1].handle))
 
-    def _report(self, now: float) -> None:
+    def _be_deaf(self, now: float) -> None:
         self._deaf_until = now + self._deaf_s
         self._deaf_s = min(2 * self._deaf_s, _DEAF_LAST_S)
+
+    def _report(self, now: float) -> None:
+        self._be_deaf(now)
         self._out.append(Reported(self._last_reason))
         self._message = None
         if self._last_sent is not None:

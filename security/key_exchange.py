@@ -29,7 +29,7 @@ from .generic_message import (
     PARTICIPANT_CRYPTO_TOKENS,
     GenericMessage,
 )
-from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
+from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle, SharedSecretHandle
 from .local_endpoint import LocalEndpoint
 from .plugins import Cryptographic
 from .remote_participant import RemoteParticipant
@@ -58,6 +58,7 @@ class Pair:
     participant: RemoteParticipant
     handle: CryptoHandle | None
     awaits_key: bool
+    relay_only: bool = False
     is_open: bool = False
 
 
@@ -142,6 +143,24 @@ class KeyExchange:
             participant.crypto = None
         participant.has_keys = False
 
+    def renew(
+        self, participant: RemoteParticipant, crypto: ParticipantCryptoHandle, shared_secret: SharedSecretHandle
+    ) -> None:
+        """The peer authenticated anew: it has none of our keys any more, and perhaps others of its own.
+
+        What was matched stays so; until the peer's keys have come again, nothing of it can be read.
+        """
+        former = [pair for pair in self.pairs.values() if pair.participant is participant]
+        self.forget(participant)
+        participant.crypto, participant.shared_secret = crypto, shared_secret
+        for pair in former:
+            again = self._register(pair.local, pair.remote, participant, relay_only=pair.relay_only)
+            again.is_open = pair.is_open
+        self.send_participant_keys(participant)
+        for pair in former:
+            if not pair.local.is_volatile:
+                self._send_keys(self.pairs[(pair.local.guid, pair.remote)])
+
     def _register(
         self, local: LocalEndpoint, remote: Guid, participant: RemoteParticipant, *, relay_only: bool
     ) -> Pair:
@@ -158,7 +177,7 @@ class KeyExchange:
                     local.handle, participant.crypto, participant.shared_secret
                 )
                 awaits_key = attributes.is_submessage_protected or attributes.is_payload_protected
-        pair = Pair(local, remote, participant, handle, awaits_key and not local.is_volatile)
+        pair = Pair(local, remote, participant, handle, awaits_key and not local.is_volatile, relay_only)
         self.pairs[(local.guid, remote)] = pair
         self.by_remote.setdefault(bytes(remote), []).append(pair)
         if handle is not None:

@@ -26,12 +26,19 @@ class Standing(Enum):
 
 @dataclass(slots=True)
 class RemoteParticipant:
-    """``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first."""
+    """``renewal``: another handshake, that will take the first one's place: the peer has lost what it knew of us.
+    Whoever says so cannot prove it, so the next one is not begun before ``next_renewal``, in engine seconds.
+
+    ``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first.
+    """
 
     data: DiscoveredParticipantData
     standing: Standing
     reason: str = ""
     handshake: Handshake | None = None
+    renewal: Handshake | None = None
+    next_renewal: float = 0.0
+    renewal_pause_s: float = 1.0
     permissions: PermissionsHandle | None = None
     shared_secret: SharedSecretHandle | None = None
     crypto: ParticipantCryptoHandle | None = None

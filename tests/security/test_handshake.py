@@ -248,9 +248,10 @@ def test_a_forged_request_does_not_displace_the_true_one() -> None:
     low, high = awaiting_final()
     true_reply = high.sent[-1]
     for index in range(MAX_REPLIES - 1):
-        high.receive(token("Req", f"forged{index}"), 0.02)
-    low.receive(true_reply, 0.03)
-    high.receive(low.sent[-1], 0.04)
+        high.receive(token("Req", f"forged{index}"), 0.1 * (index + 1))
+    assert len(high.plugin.exchanges) == MAX_REPLIES
+    low.receive(true_reply, 0.5)
+    high.receive(low.sent[-1], 0.6)
     assert high.is_authenticated
     assert isinstance(high.told[-1], Authenticated)
     assert high.told[-1].handle is high.plugin.exchanges[0]
@@ -259,9 +260,43 @@ def test_a_forged_request_does_not_displace_the_true_one() -> None:
 
 def test_replies_under_way_are_bounded() -> None:
     _, high = awaiting_final()
-    for index in range(50):
-        high.receive(token("Req", f"forged{index}"), 0.02)
+    for index in range(20):
+        high.receive(token("Req", f"forged{index}"), 0.02 + 2 * index)
+    assert len(high.plugin.exchanges) == 21
     assert sum(not exchange.is_returned for exchange in high.plugin.exchanges) == MAX_REPLIES
+
+
+def test_a_flood_of_requests_is_answered_ever_more_slowly() -> None:
+    _, high = awaiting_final()
+    for index in range(1000):
+        high.receive(token("Req", f"forged{index}"), 0.02 + index * 0.001)
+    assert 3 < len(high.plugin.exchanges) < 12
+
+
+def authenticated() -> tuple[Side, Side]:
+    low, high = awaiting_final()
+    low.receive(high.sent[-1], 0.02)
+    high.receive(low.sent[-1], 0.03)
+    assert low.is_authenticated
+    assert high.is_authenticated
+    return low, high
+
+
+def test_another_request_begins_anew_and_a_late_copy_does_not() -> None:
+    low, high = authenticated()
+    request, final = low.sent
+    assert high.machine.is_begun_anew_by(token("Req", "another"))
+    assert not high.machine.is_begun_anew_by(request)
+    assert not high.machine.is_begun_anew_by(final)
+    assert not low.machine.is_begun_anew_by(request), "we begin, and nobody else"
+
+
+def test_another_request_for_authentication_begins_anew() -> None:
+    low, high = authenticated()
+    assert low.machine.is_begun_anew_by(token("AuthReq", "another", class_id=AUTH_REQUEST))
+    low.receive(high.sent[0], 0.1)
+    assert not low.machine.is_begun_anew_by(high.sent[0])
+    assert not high.machine.is_begun_anew_by(token("AuthReq", class_id=AUTH_REQUEST)), "it waits for a request"
 
 
 def test_a_request_for_authentication_hurries_the_initiator() -> None:

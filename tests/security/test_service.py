@@ -11,15 +11,22 @@ from ddsi.spi import ADMITTED, PENDING, PLAINTEXT, SPI_VERSION, NoKeys, Refused,
 from ddsi.spi import Protection as Level
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
-from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.errors import ConfigurationError, NotAllowedBySecurity
 from ddsi.structure.guid import EntityId, EntityKind, Guid
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import Property
 from ddsi_security import service
-from ddsi_security.generic_message import GenericMessage, MessageIdentity, read_generic_message, write_generic_message
+from ddsi_security.generic_message import (
+    AUTH_REQUEST,
+    GenericMessage,
+    MessageIdentity,
+    read_generic_message,
+    write_generic_message,
+)
 from ddsi_security.local_endpoint import BUILTIN_SECURE_TOPICS
+from ddsi_security.tokens import DataHolder
 
 from .seam import NOW_NS, Side, deliver, introduce, match_builtin_topics, properties_of
 
@@ -354,6 +361,55 @@ def test_it_may_come_back() -> None:
     introduce(alice, bob)
     assert alice.has_admitted(bob)
     assert bob.has_admitted(alice)
+
+
+@pytest.mark.parametrize("forgetful", ["alice", "bob"])
+def test_who_forgot_the_other_is_authenticated_anew_and_gets_all_keys_again(forgetful: str) -> None:
+    """Its lease ran out on one side only.  Alice begins handshakes, Bob asks for them."""
+    alice, bob = trusting_pair()
+    one, other = (alice, bob) if forgetful == "alice" else (bob, alice)
+    other.hooks.local_writer(writer_data(other))
+    other.match(USER_WRITER, one, USER_READER, "Square")
+    deliver(alice, bob)
+    one.hooks.remote_participant_lost(other.guid)
+    one.decided.clear()
+    one.hooks.remote_participant(other.data, 10.0)
+    for now in (10.0, 10.2, 10.5):
+        one.hooks.handle_timeout(now)
+        deliver(alice, bob, now=now)
+    assert one.has_admitted(other)
+    one.hooks.local_reader(reader_data(one))
+    for topic in reversed(BUILTIN_SECURE_TOPICS):
+        one.match(topic.writer_id, other, topic.reader_id)
+        one.match(topic.reader_id, other, topic.writer_id)
+    one.match(USER_READER, other, USER_WRITER, "Square")
+    deliver(alice, bob, now=11.0)
+    assert set(one.decided.values()) == {ADMITTED}
+    writer, reader = ids.SEDP_PUBLICATIONS_SECURE_WRITER, ids.SEDP_PUBLICATIONS_SECURE_READER
+    for sender, receiver in ((alice, bob), (bob, alice)):
+        plain = heartbeat(writer, reader)
+        protected = sender.protect(writer, receiver.endpoint(reader), plain)
+        assert bytes(receiver.open(protected, sender)) == plain  # type: ignore[arg-type]
+
+
+def test_asking_for_it_again_and_again_costs_less_and_less() -> None:
+    alice, bob = trusting_pair()
+    renewed = 0
+    for second in range(100):
+        message = GenericMessage(
+            message_identity=MessageIdentity(bob.endpoint(ids.PARTICIPANT_STATELESS_MESSAGE_WRITER), second + 50),
+            destination_participant_guid=alice.guid,
+            message_class_id=AUTH_REQUEST,
+            message_data=(DataHolder("DDS:Auth:PKI-DH:1.0+AuthReq", (), (("future_challenge", bytes(32)),)),),
+        )
+        source = bob.endpoint(ids.PARTICIPANT_STATELESS_MESSAGE_WRITER)
+        before = alice.hooks._remotes[bob.guid.prefix].handshake
+        alice.hooks.receive_message(
+            CacheChange(ChangeKind.ALIVE, source, second + 50, write_generic_message(message)), float(second)
+        )
+        deliver(alice, bob, now=float(second))
+        renewed += alice.hooks._remotes[bob.guid.prefix].handshake is not before
+    assert 3 < renewed < 9
 
 
 def test_what_expires_is_taken_out_as_an_event() -> None:
