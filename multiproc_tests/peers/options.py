@@ -32,6 +32,9 @@ class Options:
     unicast: bool = False
     gate: bool = False
     hold: bool = True
+    keystore: str = ""
+    identity: str = "alice"
+    governance: str = "governance.p7s"
 
     def arguments(self) -> list[str]:
         """The options as words, without the role."""
@@ -44,6 +47,8 @@ class Options:
             words += ["-P", ",".join(self.partitions)]
         if self.blob_octets is not None:
             words += ["-B", str(self.blob_octets)]
+        if self.keystore:
+            words += ["-k", self.keystore, "-p", self.identity, "-g", self.governance]
         flags = {
             "-b": self.best_effort,
             "-v": self.volatile,

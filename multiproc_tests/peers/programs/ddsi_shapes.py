@@ -77,6 +77,21 @@ def key_of(sample: Any) -> Any:
     return sample.id if hasattr(sample, "data") else sample.color
 
 
+def participant_qos(o: Arguments) -> ddsi.Qos:
+    """The identity, the rights and the governance in the folder of ``-k``, under the OMG's names."""
+    if not o.store:
+        return ddsi.Qos()
+    files = {
+        "dds.sec.auth.identity_ca": "identity_ca.pem",
+        "dds.sec.auth.identity_certificate": f"{o.name}.pem",
+        "dds.sec.auth.private_key": f"{o.name}.key",
+        "dds.sec.access.permissions_ca": "permissions_ca.pem",
+        "dds.sec.access.governance": o.governance,
+        "dds.sec.access.permissions": f"{o.name}.permissions.p7s",
+    }
+    return ddsi.Qos(properties={name: f"file:{o.store}/{file}" for name, file in files.items()})
+
+
 def endpoint_qos(o: Arguments) -> ddsi.Qos:
     qos = ddsi.Qos(
         reliability=ddsi.BestEffort() if o.best_effort else ddsi.Reliable(max_blocking_time=10),
@@ -203,9 +218,14 @@ async def subscribe(o: Arguments, participant: ddsi.DomainParticipant, topic: An
 
 async def main() -> int:
     o = parse_arguments()
-    async with ddsi.DomainParticipant(o.domain) as participant:
-        topic: Any = ddsi.Topic(participant, o.topic, kind_of(o))
-        return await (publish if o.is_publisher else subscribe)(o, participant, topic)
+    try:
+        async with ddsi.DomainParticipant(o.domain, qos=participant_qos(o)) as participant:
+            say("GUID", participant.guid.hex())
+            topic: Any = ddsi.Topic(participant, o.topic, kind_of(o))
+            return await (publish if o.is_publisher else subscribe)(o, participant, topic)
+    except ddsi.DdsError as error:
+        say("ERROR", " ".join(str(error).split()))
+        return 2
 
 
 if __name__ == "__main__":
