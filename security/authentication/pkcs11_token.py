@@ -4,13 +4,14 @@ The package ``pkcs11`` (python-pkcs11) is imported only when a ``pkcs11:`` URI o
 way that forbids to call it from two threads at once; signatures are made in worker threads.  So each library is a queue
 of one: who takes it out uses it and puts it back.
 
-A token is logged in once for all sessions of the process, so the session that logged in stays open as long as the key.
+A token is logged in, and out, for all sessions of the process at once.  So a key that was logged out by another's end
+logs in again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256, sha384
 from queue import SimpleQueue
 from types import ModuleType
@@ -33,29 +34,57 @@ _LIBRARIES: Final[dict[str, SimpleQueue[Any]]] = {}
 class TokenKey:
     """A private key that never leaves its token."""
 
-    __slots__ = ("_key", "_module", "_session", "algorithm")
+    __slots__ = ("_key", "_name", "_session", "_uri", "algorithm")
 
     def __init__(self, name: str, uri: Pkcs11Uri, algorithm: SignatureAlgorithm) -> None:
         """``algorithm``: that of the certificate; that the key fits it is seen when it signs.
 
         Raises ConfigurationError.
         """
-        pkcs11 = _imported(name)
         self.algorithm: Final = algorithm
-        self._module: Final = uri.module
+        self._name: Final = name
+        self._uri: Final = uri
+        self._session: Any = None
+        self._key: Any = None
+        pkcs11 = _imported(name)
         with _errors(name, uri, pkcs11), _library(name, uri.module, pkcs11) as library:
-            self._session: Any = _open(name, library, uri, pkcs11)
-            self._key: Any = _find(name, self._session, uri, pkcs11.ObjectClass.PRIVATE_KEY)
+            self._find(library, pkcs11)
 
     def sign(self, content: bytes) -> bytes:
-        pkcs11 = _imported("dds.sec.auth.private_key")
-        with _library("dds.sec.auth.private_key", self._module, pkcs11):
+        pkcs11 = _imported(self._name)
+        with _library(self._name, self._uri.module, pkcs11) as library:
             if self._key is None:
                 raise NotTrusted("our identity was returned meanwhile")
             try:
                 return self._sign(content, pkcs11)
+            except (pkcs11.ObjectHandleInvalid, pkcs11.SessionHandleInvalid, pkcs11.UserNotLoggedIn):
+                return self._sign_again(content, library, pkcs11)
             except pkcs11.PKCS11Error as error:
                 raise NotTrusted(f"our hardware token does not sign: {type(error).__name__}") from error
+
+    def close(self) -> None:
+        """Log out, and with us all in this process who use the token: they log in again when they sign."""
+        if self._key is not None:
+            self._key = None
+            pkcs11 = _imported(self._name)
+            with _library(self._name, self._uri.module, pkcs11), suppress(pkcs11.PKCS11Error):
+                self._session.close()
+
+    def _find(self, library: Any, pkcs11: ModuleType) -> None:
+        session = _open(self._name, library, self._uri, pkcs11)
+        try:
+            self._key = _find(self._name, session, self._uri, pkcs11.ObjectClass.PRIVATE_KEY)
+        except BaseException:
+            session.close()
+            raise
+        self._session = session
+
+    def _sign_again(self, content: bytes, library: Any, pkcs11: ModuleType) -> bytes:
+        try:
+            self._find(library, pkcs11)
+            return self._sign(content, pkcs11)
+        except (ConfigurationError, pkcs11.PKCS11Error) as error:
+            raise NotTrusted(f"our hardware token does not sign any more: {type(error).__name__}") from error
 
     def _sign(self, content: bytes, pkcs11: ModuleType) -> bytes:
         if self.algorithm is RSA_2048:
@@ -66,14 +95,6 @@ class TokenKey:
         signature = bytes(self._key.sign(digest, mechanism=pkcs11.Mechanism.ECDSA))
         half = len(signature) // 2
         return encode_dss_signature(int.from_bytes(signature[:half], "big"), int.from_bytes(signature[half:], "big"))
-
-    def close(self) -> None:
-        """Log out, unless others in this process still have the token open."""
-        if self._key is not None:
-            self._key = None
-            pkcs11 = _imported("dds.sec.auth.private_key")
-            with _library("dds.sec.auth.private_key", self._module, pkcs11):
-                self._session.close()
 
     def __repr__(self) -> str:
         return f"<TokenKey {self.algorithm.key}>"
