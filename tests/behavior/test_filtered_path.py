@@ -7,6 +7,7 @@ that they are not for it.  First the writer alone, then whole domains over bad n
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
@@ -19,6 +20,8 @@ from ddsi.config import Config
 from ddsi.messages.gap import Gap
 from ddsi.messages.raw_submessage import SubmessageKind, iterate_submessages
 from ddsi.simulation import Domain, LinkConditions, NodeReader, NodeWriter, invariants
+from ddsi.spi import ADMITTED, PENDING, Admission, Decided, HookEffect, Plaintext
+from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import BestEffort, KeepAll, Lifespan, Reliable, TransientLocal
@@ -392,9 +395,7 @@ def test_a_peer_that_omits_the_gap_converges_by_acknack(seed: int, monkeypatch: 
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_peer_whose_heartbeats_speak_of_all_numbers_converges_too(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_peer_whose_heartbeats_speak_of_all_numbers_converges_too(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """So does Cyclone DDS: its GAPs come in answer to an ACKNACK only, for whatever the HEARTBEAT made us ask."""
 
     def undirected(writer: FilteringWriter, proxy: ReaderProxy, *, liveliness: bool = False) -> SendHeartbeat:
@@ -453,6 +454,43 @@ def test_best_effort_readers_are_not_affected() -> None:
     for index, reader in enumerate(crowd.readers):
         assert reader.session(crowd.writer.guid).numbers == list(range(index + 1, 10, 3))
         assert reader.local.lost.total_count == 0, "numbers for others are no loss"
+
+
+class _Hesitant(Plaintext):
+    """Admits no writer until it has made up its mind."""
+
+    def __init__(self) -> None:
+        self.effects: list[HookEffect] = []
+
+    def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
+        return ADMITTED if local.entity_id.is_builtin else PENDING
+
+    def drain_effects(self) -> Sequence[HookEffect]:
+        effects, self.effects = self.effects, []
+        return effects
+
+
+def test_what_was_written_before_the_reader_admits_the_writer_comes_at_once_then() -> None:
+    """Two that authenticate each other are never done at the same moment, and the first to be sends its keys."""
+    domain = Domain(seed=1)
+    hooks = _Hesitant()
+    node = domain.node()
+    writer = node.writer("keys", RELIABLE_QOS, filters=True)
+    late = domain.node(make_hooks=lambda: hooks).reader("keys", RELIABLE_QOS, uses_filter=True)
+    other = domain.node().reader("keys", RELIABLE_QOS, uses_filter=True)
+    assert domain.run_until(lambda: writer.matched_count == 2, 5)
+    for reader in (other, late, other, late):
+        writer.write(destination=reader.guid.participant)
+    domain.run(3)
+    assert (late.matched_count, late.taken) == (0, [])
+    assert other.session(writer.guid).numbers == [1, 3], "and the other did not wait"
+    hooks.effects.append(Decided(late.guid, writer.guid, ADMITTED))
+    late.node.pump()
+    domain.run(0.02)
+    assert late.session(writer.guid).numbers == [2, 4]
+    assert late.local.lost.total_count == 0
+    domain.run(0.1)
+    assert held_by(writer) == []
 
 
 def test_one_reader_that_is_silent_blocks_nobody() -> None:
