@@ -5,7 +5,6 @@ The answer is access control's own (:mod:`ddsi_security.access_control.checks`),
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -16,7 +15,7 @@ from ddsi.structure.errors import ConfigurationError
 
 from ..access_control.checks import may_join, may_use_endpoint, may_use_topic
 from ..access_control.decision import Decision, Step
-from ..access_control.governance import DomainRule, Governance, TopicRule
+from ..access_control.governance import DomainRule, Governance
 from ..access_control.permissions import ActionKind, Permissions
 from ..access_control.protection import ProtectionKind
 from ..access_control.smime import SignedXml, verify
@@ -193,56 +192,40 @@ def _ask(
 
 # --- protection ----------------------------------------------------------------------------------------------
 
+_EFFECTS: Final = {
+    ProtectionKind.NONE: "not protected by it",
+    ProtectionKind.SIGN: "signed, and readable by anybody",
+    ProtectionKind.ENCRYPT: "encrypted and signed",
+    ProtectionKind.SIGN_WITH_ORIGIN_AUTHENTICATION: "signed for each receiver apart, and readable by anybody",
+    ProtectionKind.ENCRYPT_WITH_ORIGIN_AUTHENTICATION: "encrypted, and signed for each receiver apart",
+}
+
 
 def _protection(path: Path, documents: _Documents, rule: DomainRule, question: Question) -> tuple[Protection, ...]:
     index = documents.governance.domain_rules.index(rule)
     node = documents.governance_root.get("domain_access_rules").all("domain_rule")[index]
-    layers = [_layer(path, node, "rtps_protection_kind", rule.rtps_protection_kind, "RTPS messages")]
+    layers = [_layer(path, node, "rtps_protection_kind", "RTPS messages")]
     topic_rule = rule.topic_rule(question.topic) if question.verb != _JOIN else None
     if topic_rule is None:
-        discovery = _layer(
-            path, node, "discovery_protection_kind", rule.discovery_protection_kind, "messages of secure discovery"
-        )
-        liveliness = _layer(
-            path, node, "liveliness_protection_kind", rule.liveliness_protection_kind, "messages of secure liveliness"
-        )
-        return (*layers, discovery, liveliness)
-    if topic_rule not in rule.topic_rules:
-        return tuple(layers)  # the log topic, whose rule stands in no document
-    topic_node = node.get("topic_access_rules").all("topic_rule")[rule.topic_rules.index(topic_rule)]
-    return (*layers, *_topic_layers(path, node, topic_node, rule, topic_rule))
+        layers.append(_layer(path, node, "discovery_protection_kind", "messages of secure discovery"))
+        layers.append(_layer(path, node, "liveliness_protection_kind", "messages of secure liveliness"))
+    elif topic_rule in rule.topic_rules:  # the rule of the log topic stands in no document
+        topic_node = node.get("topic_access_rules").all("topic_rule")[rule.topic_rules.index(topic_rule)]
+        layers.append(_layer(path, topic_node, "metadata_protection_kind", "submessages of the topic"))
+        layers.append(_layer(path, topic_node, "data_protection_kind", "payloads of samples"))
+        layers.append(_switched_layer(path, node, topic_node, "discovery", "its announcements"))
+        layers.append(_switched_layer(path, node, topic_node, "liveliness", "assertions of its liveliness"))
+    return tuple(layers)
 
 
-def _topic_layers(
-    path: Path, node: Node, topic_node: Node, rule: DomainRule, topic_rule: TopicRule
-) -> Sequence[Protection]:
-    metadata = _layer(
-        path, topic_node, "metadata_protection_kind", topic_rule.metadata_protection_kind, "submessages of the topic"
-    )
-    data = _layer(path, topic_node, "data_protection_kind", topic_rule.data_protection_kind, "payloads of samples")
-    layers = [metadata, data]
-    for tag, kind, is_on, what in (
-        ("discovery", rule.discovery_protection_kind, topic_rule.enable_discovery_protection, "its announcements"),
-        (
-            "liveliness",
-            rule.liveliness_protection_kind,
-            topic_rule.enable_liveliness_protection,
-            "assertions of its liveliness",
-        ),
-    ):
-        if is_on:
-            layers.append(_layer(path, node, f"{tag}_protection_kind", kind, what))
-        else:
-            flag = topic_node.get(f"enable_{tag}_protection")
-            layers.append(Protection(path, flag.line, flag.tag, flag.text, f"{what} are in clear"))
-    return layers
+def _layer(path: Path, node: Node, tag: str, what: str) -> Protection:
+    element = node.get(tag)
+    return Protection(path, element.line, tag, element.text, f"{what} are {_EFFECTS[ProtectionKind(element.text)]}")
 
 
-def _layer(path: Path, node: Node, tag: str, kind: ProtectionKind, what: str) -> Protection:
-    effect = (
-        "encrypted and signed" if kind.is_encrypted else "signed, and readable by anybody" if kind.is_protected else ""
-    )
-    if kind.is_origin_authenticated:
-        effect += ", for each receiver apart"
-    text = f"{what} are {effect}" if effect else f"{what} are not protected by it"
-    return Protection(path, node.get(tag).line, tag, kind.value, text)
+def _switched_layer(path: Path, node: Node, topic_node: Node, about: str, what: str) -> Protection:
+    """One that the topic rule switches on, and whose kind is the domain's."""
+    switch = topic_node.get(f"enable_{about}_protection")
+    if switch.text.lower() in ("true", "1"):
+        return _layer(path, node, f"{about}_protection_kind", what)
+    return Protection(path, switch.line, switch.tag, switch.text, f"{what} are in clear")

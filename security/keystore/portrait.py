@@ -30,7 +30,7 @@ from .survey import Survey, survey
 
 __all__ = ["Portrait", "portrait_lines", "portray"]
 
-Value: TypeAlias = "str | int | bool | None | Sequence[Value] | Mapping[str, Value]"
+Value: TypeAlias = "str | int | Sequence[Value] | Mapping[str, Value] | None"
 Portrait: TypeAlias = dict[str, Value]
 
 
@@ -127,7 +127,7 @@ def _document(path: Path, octets: bytes, beside: Survey) -> Portrait:
     signed = signer[1] if signer else unverified(octets)
     if signed is None:
         raise ConfigurationError(
-            f"{path} is signed in a form that hides its text, by an authority that is not beside it"
+            f"{path} hides its text in its signature, and the authority that made it is not beside it"
         )
     model = parse_document(kind, signed.xml, str(path), signed.first_line)
     signature = f"by {signer[0].name}" if signer else "not by an authority beside it" if is_signed(octets) else "none"

@@ -27,6 +27,8 @@ from .keystore import ENCLAVES, Keystore
 __all__ = ["Enclave", "Survey", "find_enclaves", "find_keystore", "key_files", "survey"]
 
 _MOST_FILES: Final = 5000
+_STANDARD_CAS: Final = ("identity_ca.cert.pem", "permissions_ca.cert.pem")
+"""With such a name an authority is for one purpose, and does not stand in where the other is missing."""
 _PUBLIC, _PRIVATE = "public", "private"
 _PEM_CERTIFICATE: Final = re.compile(rb"-----BEGIN (X509 |TRUSTED )?CERTIFICATE-----")
 _PEM_KEY: Final = re.compile(rb"-----BEGIN ([A-Z0-9]+ )*PRIVATE KEY-----")
@@ -159,7 +161,7 @@ def _enclaves_by_content(root: Path) -> Iterator[Enclave]:
 def _enclave(name: str, folder: Path, certificate: Path, found: Survey) -> Enclave:
     """By the names of ROS 2, else by content, else where ROS 2 would have it."""
     identity = found.certificates.get(certificate)
-    authorities = [path for path in found.authorities() if path != certificate]
+    authorities = [path for path in found.authorities() if path != certificate and path.name not in _STANDARD_CAS]
     issuers = [path for path in authorities if identity and is_issued_by(identity, found.certificates[path])]
     identity_ca = next(iter(issuers), None) or _named(authorities, "ident") or next(iter(authorities), None)
     permissions_ca = _named(authorities, "perm") or identity_ca
