@@ -102,6 +102,7 @@ from .structure.status import (
     SampleLost,
     SampleRejected,
     SecurityRefused,
+    SecurityRevoked,
     Status,
     SubscriptionMatched,
 )
@@ -181,6 +182,7 @@ __all__ = [
     "SampleRejected",
     "SampleState",
     "SecurityRefused",
+    "SecurityRevoked",
     "Shared",
     "Status",
     "Subscriber",

@@ -114,7 +114,10 @@ class DataReader(Entity, Generic[T]):
         return self
 
     async def __anext__(self) -> Sample[T]:
-        """Take the next sample, waiting for one.  Iteration ends when the reader is closed."""
+        """Take the next sample, waiting for one.  Iteration ends when the reader is closed.
+
+        Raises NotAllowedBySecurity when it was closed because its participant's rights have ended.
+        """
         await self._pump.checkpoint(self._pump.now())
         while not self._is_closed:
             taken = self._history.take_next()
@@ -125,6 +128,7 @@ class DataReader(Entity, Generic[T]):
                     return sample
                 continue
             await self._wait_for_news()
+        self._check_not_revoked()
         raise StopAsyncIteration
 
     def take(
@@ -312,4 +316,5 @@ def _key_codec(topic: Topic[T]) -> KeyCodec:
         from_key_payload=support.key_from_key_payload,
         from_key_hash=support.key_from_key_hash,
         to_key_hash=lambda key: support.key_hash(key, DataRepresentationId.XCDR1),
+        to_secret_key_hash=lambda key: support.key_hash(key, DataRepresentationId.XCDR1, is_secret=True),
     )

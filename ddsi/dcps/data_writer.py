@@ -77,6 +77,7 @@ class DataWriter(Entity, Generic[T]):
         self._writer: LocalWriter = self._pump.engine.create_writer(
             topic.name, support.type_name, resolved, self._pump.now(), is_keyed=support.is_keyed
         )
+        self._hides_keys = support.is_keyed and self._writer.protection.key_protected
         parent._adopt(self)
         participant._register(self._writer.guid, self)
         self._pump.settle()
@@ -113,12 +114,13 @@ class DataWriter(Entity, Generic[T]):
             self._check_open()
         writer = self._writer
         payload = self._serialize(sample)
-        key = self._key(sample) if self._is_keyed and writer.behavior.needs_key else b""
+        key = self._key(sample) if self._is_keyed and (self._hides_keys or writer.behavior.needs_key) else b""
         if writer.behavior.lacks_room(len(payload), key) is not None:
             now = await self._wait_for_room(len(payload), key)
         pump.engine.write(
             writer, ChangeKind.ALIVE, payload, key, now,
             source_timestamp=None if timestamp is None else _ticks(timestamp),
+            key_hash=self._key_hash(key) if self._hides_keys else b"",
         )  # fmt: skip
         pump.written(now)
 
@@ -145,9 +147,14 @@ class DataWriter(Entity, Generic[T]):
         self._pump.engine.write(
             self._writer, kind, payload, key, now,
             source_timestamp=None if timestamp is None else _ticks(timestamp),
-            key_hash=self._support.key_hash(key, self._representation),
+            key_hash=self._key_hash(key),
         )  # fmt: skip
         self._pump.written(now)
+
+    def _key_hash(self, key: bytes) -> bytes:
+        """Where the key is protected the hash is a digest, and goes with samples too: nobody can compute it before
+        decrypting them."""
+        return self._support.key_hash(key, self._representation, is_secret=self._hides_keys)
 
     async def _wait_for_room(self, octets: int, key: bytes) -> float:
         """Until one more change of so many octets may enter; returns the time.  Raises DdsTimeout."""

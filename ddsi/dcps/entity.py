@@ -12,7 +12,7 @@ from weakref import WeakSet
 
 import trio
 
-from ..structure.errors import AlreadyDeleted, BadParameter
+from ..structure.errors import AlreadyDeleted, BadParameter, NotAllowedBySecurity
 from ..structure.qos import Qos
 from ..structure.status import Status
 
@@ -72,6 +72,7 @@ class Entity:
             raise BadParameter(f"{type(self).__name__}: qos is a ddsi.Qos(...), not {qos!r}")
         self._qos = qos if qos is not None else Qos()
         self._is_closed = False
+        self._revocation: str | None = None  # why security closed it, if it did
         self._changed = trio.lowlevel.ParkingLot()
         self._statuses: dict[type, Status] = {}
         # Weakly: a stream lives as long as somebody reads it, and ends with the loop that did.
@@ -138,8 +139,17 @@ class Entity:
         for stream in self._streams:
             stream.put(status)
 
+    def _revoke(self, reason: str) -> None:
+        """Security is about to close it: what is asked of it afterwards fails and says why."""
+        self._revocation = reason
+
+    def _check_not_revoked(self) -> None:
+        if self._revocation is not None:
+            raise NotAllowedBySecurity(f"{self!r} was closed: {self._revocation}")
+
     def _check_open(self) -> None:
         if self._is_closed:
+            self._check_not_revoked()
             raise AlreadyDeleted(f"{self!r} was closed, by close() or with what it belongs to; make another")
 
 
@@ -157,6 +167,11 @@ class Parent(Entity):
 
     def _adopt(self, entity: Entity) -> None:
         self._members[entity] = None
+
+    def _revoke(self, reason: str) -> None:
+        super()._revoke(reason)
+        for entity in self._members:
+            entity._revoke(reason)
 
     def _disown(self, entity: Entity) -> None:
         self._members.pop(entity, None)

@@ -23,7 +23,7 @@ from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderDa
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import Qos
-from ..structure.status import SecurityRefused
+from ..structure.status import SecurityRefused, SecurityRevoked
 from ..transport import Pump, PumpOptions
 from .entity import Entity, Parent, deadline_scope
 from .lifetime import Lifetime
@@ -45,7 +45,7 @@ class DomainParticipant(Parent):
     Everything created with it is closed with it.
     """
 
-    STATUSES: ClassVar[tuple[type, ...]] = (SecurityRefused,)
+    STATUSES: ClassVar[tuple[type, ...]] = (SecurityRefused, SecurityRevoked)
 
     def __init__(
         self,
@@ -213,6 +213,7 @@ class DomainParticipant(Parent):
 
     def _running_pump(self) -> Pump:
         if self._is_closed:
+            self._check_not_revoked()
             raise AlreadyDeleted(f"{self!r}: what was asked needs a participant that is open; make another")
         if self._pump is None:
             raise PreconditionNotMet(
@@ -247,8 +248,20 @@ class DomainParticipant(Parent):
                 entity = self if guid == self._engine_guid() else self._by_guid.get(guid)
                 if entity is not None:
                     entity._status_changed(status)
+                if isinstance(status, SecurityRevoked):
+                    self._end_revoked(status.reason)
             case DiscoveryChanged():
                 self._discovery_lot.unpark_all()
+
+    def _end_revoked(self, reason: str) -> None:
+        """Our rights have ended.  Not at once: somebody is in the middle of acting on the engine's effects."""
+
+        def end() -> None:
+            if not self._is_closed:
+                self._revoke(reason)
+                self.close()
+
+        self._running_pump().call_soon(end)
 
     def _engine_guid(self) -> Guid:
         assert self._pump is not None

@@ -40,13 +40,15 @@ class KeyCodec:
     """How a reader finds the instance that octets belong to; made from the topic's type.
 
     Each returns the key in canonical form and raises MalformedSample.  ``from_key_hash`` returns None where the
-    hash is a digest that cannot be turned back.
+    hash is a digest that cannot be turned back.  ``to_secret_key_hash`` always makes a digest (DDS-Security 1.1
+    §8.4.2.7, is_key_protected).
     """
 
     from_payload: Callable[[Octets], bytes]
     from_key_payload: Callable[[Octets], bytes]
     from_key_hash: Callable[[bytes], bytes | None]
     to_key_hash: Callable[[bytes], bytes]
+    to_secret_key_hash: Callable[[bytes], bytes]
 
 
 class LocalWriter:
@@ -200,9 +202,11 @@ class LocalReader:
             return self.keys.from_key_payload(change.payload)
         if not change.key_hash:
             return None
-        return self.keys.from_key_hash(change.key_hash) or self._known_key(change.key_hash)
+        if self.protection.key_protected:
+            return self._known_key(change.key_hash, self.keys.to_secret_key_hash)
+        return self.keys.from_key_hash(change.key_hash) or self._known_key(change.key_hash, self.keys.to_key_hash)
 
-    def _known_key(self, key_hash: bytes) -> bytes | None:
+    def _known_key(self, key_hash: bytes, to_key_hash: Callable[[bytes], bytes]) -> bytes | None:
         if self.history is None:
             return None
         known = self._keys_by_hash
@@ -211,8 +215,8 @@ class LocalReader:
                 known.clear()
             hashed = set(known.values())
             for key in self.history.instances:
-                if key not in hashed and self.keys is not None:
-                    known[self.keys.to_key_hash(key)] = key
+                if key not in hashed:
+                    known[to_key_hash(key)] = key
         return known.get(key_hash)
 
 

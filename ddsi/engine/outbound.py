@@ -96,7 +96,7 @@ class Outbound:
         behavior = writer.behavior
         if not behavior.locators:
             return
-        if change.kind is not ChangeKind.ALIVE or change.related is not None:
+        if change.kind is not ChangeKind.ALIVE or change.related is not None or change.key_hash:
             self._send_data(writer, change, None)
             return
         payload = self._hooks.encode_payload(writer.guid, change.payload)
@@ -289,14 +289,14 @@ def _inline_qos(change: CacheChange) -> ParameterList | None:
     """What must travel beside the payload: which end this is, and whose; and what the sample answers.
 
     The key hash goes with every dispose and unregister, and the serialised key too: some stacks need the one
-    (Fast DDS), some the other (Cyclone DDS).
+    (Fast DDS), some the other (Cyclone DDS).  With samples it goes where their key is protected.
     """
-    if change.kind is ChangeKind.ALIVE and change.related is None:
+    if change.kind is ChangeKind.ALIVE and change.related is None and not change.key_hash:
         return None
     parameters = ParameterList(little_endian=True)
+    if change.key_hash:
+        parameters.add(ParameterId.KEY_HASH, change.key_hash)
     if change.kind is not ChangeKind.ALIVE:
-        if change.key_hash:
-            parameters.add(ParameterId.KEY_HASH, change.key_hash)
         parameters.add(ParameterId.STATUS_INFO, bytes((0, 0, 0, change.kind)))
     if change.related is not None:
         guid, number = change.related

@@ -7,6 +7,7 @@ and octets that follow from writer and number, so that what arrives can be told 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from hashlib import md5
 from typing import TYPE_CHECKING
 
 from ..behavior.reader_history_cache import ReaderHistoryCache
@@ -45,6 +46,7 @@ SIMULATED_KEYS = KeyCodec(
     from_key_payload=_key_of_payload,
     from_key_hash=lambda key_hash: key_hash[:1],
     to_key_hash=lambda key: key.ljust(16, b"\0"),
+    to_secret_key_hash=lambda key: md5(key, usedforsecurity=False).digest(),
 )
 """The key is the first octet behind the encapsulation header; its hash is itself, padded."""
 

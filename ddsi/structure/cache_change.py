@@ -34,8 +34,9 @@ class CacheChange:
     ``key`` is the instance's key in the canonical form (see ``xtypes``), empty for keyless topics.
     ``source_timestamp`` counts ticks (2^-32 s since 1970).  ``destination`` is the participant or reader that
     the change is meant for, GUID_UNKNOWN for everybody (the filtered path; DDS-Security 1.1 §7.4.4.4).
-    ``fragment_octets`` is how large its writer cuts the fragments of a change that is too large for one message; it stays
-    so, whatever size newer changes get.  ``related`` is who and which sample this one answers: PID_RELATED_SAMPLE_IDENTITY's (Guid, number).
+    ``fragment_octets`` is how large its writer cuts the fragments of a change that is too large for one message; it
+    stays so, whatever size newer changes get.  ``related`` is who and which sample this one answers:
+    PID_RELATED_SAMPLE_IDENTITY's (Guid, number).
     """
 
     __slots__ = (

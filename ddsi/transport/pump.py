@@ -93,6 +93,7 @@ class Pump:
         self._running = trio.CancelScope()
         self._nursery: trio.Nursery | None = None
         self._jobs: list[Compute] = []
+        self._calls: list[Callable[[], None]] = []
         self._limiter = trio.CapacityLimiter(_COMPUTE_THREADS)
         self._operations = 0
         self._last_yield = -math.inf
@@ -144,6 +145,8 @@ class Pump:
                 nursery.start_soon(self._send_backlog, name="ddsi send")
                 while self._jobs:
                     nursery.start_soon(self._compute, self._jobs.pop(0))
+                while self._calls:
+                    self.call_soon(self._calls.pop(0))
 
     def close(self) -> None:
         """Say goodbye and close everything.  Safe twice."""
@@ -284,6 +287,17 @@ class Pump:
         result = await trio.to_thread.run_sync(effect.job, limiter=self._limiter, abandon_on_cancel=True)
         effect.computed(result, self.now())
         self.settle()
+
+    def call_soon(self, action: Callable[[], None]) -> None:
+        """Call it from a task of its own, when nobody is in the middle of anything."""
+        if self._nursery is None:  # before `run` was scheduled for the first time
+            self._calls.append(action)
+        else:
+            self._nursery.start_soon(self._call, action, name="ddsi call")
+
+    @trio.lowlevel.enable_ki_protection
+    async def _call(self, action: Callable[[], None]) -> None:
+        action()
 
     # --- fairness ----------------------------------------------------------------------------------------
 

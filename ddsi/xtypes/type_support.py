@@ -179,10 +179,11 @@ class TypeSupport(Generic[T]):
                         return self._read_key_payload(octets[:-beyond])
             raise
 
-    def key_hash(self, key: bytes, representation: DataRepresentationId) -> bytes:
+    def key_hash(self, key: bytes, representation: DataRepresentationId, *, is_secret: bool = False) -> bytes:
         """The 16 octets of the key hash that a writer with this representation gives (RTPS 2.5 §9.6.4.8).
 
-        ``key`` is canonical; for a type without key the hash is zeros.
+        ``key`` is canonical; for a type without key the hash is zeros.  ``is_secret``: a digest, however short the key
+        is, so that the hash does not show it (DDS-Security 1.1 §8.4.2.7, is_key_protected).
         """
         if self._canonical is None:
             return bytes(KEY_HASH_OCTETS)
@@ -192,7 +193,7 @@ class TypeSupport(Generic[T]):
             octets = self._writer(self._canonical, encoding, header=False)(
                 self._read_canonical(_CANONICAL_HEADER + key)
             )
-        if hash_is_digest(self.struct, self._canonical, encoding):
+        if is_secret or hash_is_digest(self.struct, self._canonical, encoding):
             return hashlib.md5(octets, usedforsecurity=False).digest()
         return octets.ljust(KEY_HASH_OCTETS, b"\0")
 

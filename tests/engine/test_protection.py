@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hashlib import md5
+
 import pytest
 
 from ddsi.engine import Participant
@@ -13,9 +15,12 @@ from ddsi.messages.heartbeat import Heartbeat, HeartbeatFrag
 from ddsi.messages.interpreter import InfoSource
 from ddsi.serialization.parameter_id import ParameterId
 from ddsi.serialization.parameter_list import ParameterList
-from ddsi.spi import Octets, Outcome, Protection
+from ddsi.simulation.endpoints import SIMULATED_KEYS
+from ddsi.spi import Octets, Outcome, ProtectedEndpoint, Protection
 from ddsi.spi.plaintext import Plaintext
 from ddsi.structure import builtin_entity_ids as ids
+from ddsi.structure.cache_change import ChangeKind
+from ddsi.structure.discovered import DiscoveredReaderData
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
 from ddsi.structure.qos import Qos, reader_qos, writer_qos
 from ddsi.structure.qos_policies import ManualByTopic, Reliable
@@ -203,3 +208,29 @@ def test_heartbeats_in_clear_do_not_make_an_authenticated_participant_begin_anew
         beat = Heartbeat(READER, WRITER, 1, 3, count, final=True).encode()
         here.receive_datagram(there.message(beat), there.address, 0.1 * count)
     assert here.participants[there.prefix] is not proxy, "where nobody forbids it"
+
+
+@pytest.mark.parametrize(("is_hidden", "key_hash"), [(False, b"\7".ljust(16, b"\0")), (True, md5(b"\7").digest())])
+def test_where_keys_are_hidden_a_key_hash_is_looked_up_and_never_read(is_hidden: bool, key_hash: bytes) -> None:
+    """DDS-Security 1.1 §8.4.2.7: Fast DDS disposes with a key hash alone, which is a digest then."""
+
+    class Hiding(Wrapped):
+        def local_reader(self, data: DiscoveredReaderData) -> ProtectedEndpoint:
+            return ProtectedEndpoint(key_protected=is_hidden)
+
+    here, there = engine(hooks=Hiding()), Stranger()
+    remote = there.endpoint(1, is_writer=True, keyed=True)
+    reader = here.create_reader("Square", "T", reader_qos(RELIABLE), 0.0, is_keyed=True, keys=SIMULATED_KEYS)
+    there.introduce(here)
+    here.receive_datagram(there.sedp_writer(qos=RELIABLE, of=remote), there.address, 0.0)
+    pair = (reader.guid.entity_id, remote.entity_id)
+    inline = ParameterList([(ParameterId.KEY_HASH, key_hash), (ParameterId.STATUS_INFO, b"\0\0\0\1")])
+    for submessage in (
+        Heartbeat(*pair, 1, 0, 1, final=True).encode(),
+        Data(*pair, 1, None, b"\0\1\0\0\7").encode(),
+        Data(*pair, 2, inline).encode(),
+    ):
+        here.receive_datagram(there.message(submessage), there.address, 0.0)
+    assert reader.history is not None
+    taken = [(change.kind, change.key) for _, change in reader.history.take()]
+    assert taken == [(ChangeKind.ALIVE, b"\7"), (ChangeKind.NOT_ALIVE_DISPOSED, b"\7")]
