@@ -2,7 +2,7 @@
 
 from benchmarks.benchmark import Benchmark
 
-from . import codec, floors, footprint, matching, round_trip, throughput
+from . import codec, floors, footprint, matching, round_trip, security_handshake, throughput
 
 __all__ = ["BENCHMARKS"]
 
@@ -12,5 +12,6 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     *round_trip.BENCHMARKS,
     *matching.BENCHMARKS,
     *footprint.BENCHMARKS,
+    *security_handshake.BENCHMARKS,
     *floors.BENCHMARKS,
 )

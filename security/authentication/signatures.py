@@ -23,6 +23,8 @@ PublicKey = rsa.RSAPublicKey | ec.EllipticCurvePublicKey
 PSS_SALT_OCTETS: Final = 32
 _RSA_BITS: Final = 2048
 _CURVES: Final = {"secp256r1": EC_P256, "secp384r1": EC_P384}
+_SIGNING_PSS: Final = padding.PSS(padding.MGF1(hashes.SHA256()), PSS_SALT_OCTETS)
+_ANY_PSS: Final = padding.PSS(padding.MGF1(hashes.SHA256()), padding.PSS.AUTO)
 
 
 class PrivateKey(Protocol):
@@ -54,7 +56,7 @@ class SoftwareKey:
             case None:
                 raise NotTrusted("our identity was returned meanwhile")
             case rsa.RSAPrivateKey() as key:
-                return key.sign(content, _pss(PSS_SALT_OCTETS), hashes.SHA256())
+                return key.sign(content, _SIGNING_PSS, hashes.SHA256())
             case key:
                 return _sign_deterministically(key, content, hash_of(self.algorithm))
 
@@ -86,7 +88,7 @@ def verify(key: PublicKey, signature: bytes, content: bytes) -> None:
     algorithm = algorithm_of_key(key)
     try:
         if isinstance(key, rsa.RSAPublicKey):
-            key.verify(signature, content, _pss(padding.PSS.AUTO), hashes.SHA256())
+            key.verify(signature, content, _ANY_PSS, hashes.SHA256())
         else:
             key.verify(signature, content, ec.ECDSA(hash_of(algorithm)))
     except (InvalidSignature, ValueError) as error:
@@ -95,10 +97,6 @@ def verify(key: PublicKey, signature: bytes, content: bytes) -> None:
 
 def hash_of(algorithm: SignatureAlgorithm) -> hashes.SHA256 | hashes.SHA384:
     return hashes.SHA384() if algorithm is EC_P384 else hashes.SHA256()
-
-
-def _pss(salt_length: int | padding._Auto) -> padding.PSS:
-    return padding.PSS(padding.MGF1(hashes.SHA256()), salt_length)
 
 
 def _sign_deterministically(
