@@ -16,7 +16,7 @@ from ddsi.spi import Refused
 
 from ..attributes import DataTags
 from .decision import Decision, Step, decide, decide_participant, decide_topic
-from .document_error import shown
+from .document_error import shown, titled
 from .governance import DomainRule, TopicRule
 from .permissions import ActionKind, Grant
 
@@ -102,19 +102,15 @@ def _asked(grant: Grant | Refused, steps: tuple[Step, ...], decide_by: Callable[
 def _open(domain_rule: DomainRule, why: str, topic_rule: TopicRule | None = None) -> Decision:
     rule = topic_rule or domain_rule
     steps = _topic_steps(domain_rule, topic_rule, why) if topic_rule else (_domain_step(domain_rule, why),)
-    return Decision(True, f"governance {rule.document}, line {rule.line}, {rule.label}: {why}", steps)
+    return Decision(True, f"{titled('governance', rule.document)}, line {rule.line}, {rule.label}: {why}", steps)
 
 
 def _no_topic_rule(domain_rule: DomainRule, topic: str) -> Decision:
-    why = f"no topic_rule of it matches {shown(topic)}"
-    step = _domain_step(domain_rule, why)
     expressions = ", ".join(shown(rule.expression) for rule in domain_rule.topic_rules[:5])
-    return Decision(
-        False,
-        f"governance {domain_rule.document}, line {domain_rule.line}, {domain_rule.label}: no topic_rule matches topic "
-        f"{shown(topic)}; its topic_expressions are {expressions}. Missing: a topic_rule for {shown(topic)}",
-        (step,),
-    )
+    why = f"no topic_rule matches topic {shown(topic)}; its topic_expressions are {expressions}"
+    where = f"{titled('governance', domain_rule.document)}, line {domain_rule.line}, {domain_rule.label}"
+    reason = f"{where}: {why}. Missing: a topic_rule for {shown(topic)}"
+    return Decision(False, reason, (_domain_step(domain_rule, why),))
 
 
 def _domain_step(rule: DomainRule, why: str) -> Step:

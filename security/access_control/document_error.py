@@ -12,7 +12,7 @@ from collections.abc import Iterable
 
 from ddsi.structure.errors import ConfigurationError
 
-__all__ = ["DocumentError", "UntrustedDocument", "did_you_mean", "shown"]
+__all__ = ["DocumentError", "UntrustedDocument", "did_you_mean", "shown", "titled"]
 
 
 class DocumentError(ConfigurationError):
@@ -42,6 +42,11 @@ _LONGEST_SHOWN = 80
 def shown(text: str) -> str:
     """Text of a document or a peer in quotes, cut where it gets too long to read."""
     return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}...")
+
+
+def titled(kind: str, name: str) -> str:
+    """``permissions alice.p7s``; a name that says what it is needs no title."""
+    return name if name.startswith(f"{kind} ") else f"{kind} {name}"
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:

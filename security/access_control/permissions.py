@@ -16,6 +16,7 @@ from ddsi.spi import Refused
 from ddsi.structure.errors import MalformedMessage
 
 from ..attributes import DataTags
+from .document_error import titled
 from .domains import Domains, expression_of
 from .subject_name import SubjectName
 from .validity import Validity
@@ -76,7 +77,7 @@ class Grant:
     def __str__(self) -> str:
         """Where it stands, as sentences about it begin."""
         name = f"grant {self.name!r}" if self.name else "its grant"
-        return f"permissions {self.document}, {name} (line {self.line})"
+        return f"{titled('permissions', self.document)}, {name} (line {self.line})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,7 @@ class Permissions:
             named = [str(grant.subject or grant.subject_expression) for grant in self.grants[:3]]
             more = f" and {len(self.grants) - 3} more" if len(self.grants) > 3 else ""
             return Refused(
-                f"permissions {self.name}: no grant is for the subject {subject}; there are grants for "
+                f"{titled('permissions', self.name)}: no grant is for the subject {subject}; there are grants for "
                 f"{', '.join(named)}{more}"
             )
         grant, *others = grants

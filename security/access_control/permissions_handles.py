@@ -19,7 +19,7 @@ from ..handles import PermissionsHandle
 from ..properties import GOVERNANCE, PERMISSIONS, PERMISSIONS_CA
 from ..resources import read_resource, resource_name
 from ..tokens import AuthenticatedPeerCredentialToken, PermissionsToken
-from .document_error import DocumentError, shown
+from .document_error import DocumentError, shown, titled
 from .governance import DomainRule, Governance
 from .permissions import Grant, Permissions
 from .smime import verify
@@ -128,10 +128,9 @@ def _domain_rule(governance: Governance, domain_id: int, domain_tag: str) -> Dom
     if rule is None:
         tag = f" with the tag {domain_tag!r}" if domain_tag else ""
         others = "; ".join(f"line {rule.line}: {rule.domains}" for rule in governance.domain_rules[:5])
-        raise ConfigurationError(
-            f"governance {governance.name} has no domain_rule for domain {domain_id}{tag}, only for {others}. Add the "
-            "domain to a rule, or take another"
-        )
+        where = titled("governance", governance.name)
+        reason = f"{where} has no domain_rule for domain {domain_id}{tag}, only for {others}"
+        raise ConfigurationError(f"{reason}. Add the domain to a rule, or take another")
     if rule.unsupported:
         raise rule.unsupported[0]
     return rule
@@ -168,12 +167,12 @@ def _remote_grant(
 ) -> Grant | Refused:
     if (problem := _class_problem(permissions_token)) is not None:
         return problem
-    name = f"of {shown(subject)}, as received"
+    name = f"permissions of {shown(subject)}, as received"
     document = credential.binary_property("c.perm") or (credential.property("c.perm") or "").encode()
     if not document.strip(b"\0 \t\r\n"):
-        return Refused(f"permissions {name}: the peer sent none")
+        return Refused(f"{name}: there are none")
     try:
-        signed = verify(document, local.authority, name=f"permissions {name}")
+        signed = verify(document, local.authority, name=name)
         permissions = Permissions.parse(signed.xml, name=name, first_line=signed.first_line)
         return permissions.grant_for(SubjectName.parse(subject), now)
     except DocumentError as error:

@@ -30,7 +30,7 @@ from ..tokens import AuthenticatedPeerCredentialToken, DataHolder, PermissionsCr
 from .checks import may_join, may_use_endpoint, may_use_topic
 from .data_tags import data_tags_of
 from .decision import Decision
-from .document_error import shown
+from .document_error import shown, titled
 from .permissions import ActionKind, Grant
 from .permissions_handles import (
     PERMISSIONS_CLASS_ID,
@@ -278,7 +278,7 @@ class PermissionsAccessControl:
             return builtin_endpoint_attributes(domain_rule, topic_name)
         rule = domain_rule.topic_rule(topic_name)
         if rule is None:
-            where = f"governance {domain_rule.document}, line {domain_rule.line}"
+            where = f"{titled('governance', domain_rule.document)}, line {domain_rule.line}"
             raise NotAllowedBySecurity(f"{where}: no topic_rule matches topic {shown(topic_name)}")
         return endpoint_attributes(rule)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import cache
 
@@ -69,7 +70,7 @@ def governance_xml(
     domains: str = "<id_range><min>0</min><max>230</max></id_range>",
     unauthenticated: str = "false",
     join: str = "true",
-    topics: tuple[str, ...] = ("*",),
+    topics: Sequence[str] = ("*",),
     read: str = "true",
     write: str = "true",
     more: str = "",
