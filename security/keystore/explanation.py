@@ -13,7 +13,7 @@ from cryptography import x509
 
 from ddsi.structure.errors import ConfigurationError
 
-from ..access_control.checks import may_join, may_use_endpoint, may_use_topic
+from ..access_control.checks import may_join, may_use_endpoint
 from ..access_control.decision import Decision, Step
 from ..access_control.governance import DomainRule, Governance
 from ..access_control.permissions import ActionKind, Permissions
@@ -163,7 +163,7 @@ def _no_domain_rule(enclave: Enclave, governance: Governance, question: Question
 def _ask(
     enclave: Enclave, documents: _Documents, rule: DomainRule, question: Question, now: int
 ) -> list[tuple[str, Decision]]:
-    """To join is needed for all else, and to use the topic for each endpoint; the latter is shown where it fails."""
+    """To join is needed for all else; whoever may have an endpoint of a topic may create the topic."""
     subject = subject_of((enclave.certificate, documents.certificate))
     if subject is None:
         raise ConfigurationError(f"{enclave.certificate}: access control cannot read its subject; issue it anew")
@@ -175,9 +175,6 @@ def _ask(
         stages.append(("be let in by others", by_others))
     if question.verb == _JOIN:
         return stages
-    topic = may_use_topic(rule, grant, domain_id=domain_id, topic=question.topic)
-    if not topic.allowed:
-        stages.append(("use the topic", topic))
     endpoint = may_use_endpoint(
         rule,
         grant,
