@@ -2,7 +2,7 @@
 
 from benchmarks.benchmark import Benchmark
 
-from . import codec, floors, footprint, matching, round_trip, security_handshake, throughput
+from . import codec, floors, footprint, matching, round_trip, security_handshake, security_permissions, throughput
 
 __all__ = ["BENCHMARKS"]
 
@@ -13,5 +13,6 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     *matching.BENCHMARKS,
     *footprint.BENCHMARKS,
     *security_handshake.BENCHMARKS,
+    *security_permissions.BENCHMARKS,
     *floors.BENCHMARKS,
 )

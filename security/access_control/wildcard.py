@@ -64,7 +64,8 @@ def check_expression(expression: str) -> None:
     """Raise MalformedMessage for what is not an expression."""
     if len(expression) > MOST_CHARACTERS:
         raise MalformedMessage(f"an expression of {len(expression)} characters; there may be {MOST_CHARACTERS}")
-    _translate(expression)
+    if "[" in expression:  # nothing else can be wrong
+        _translate(expression)
 
 
 @lru_cache(maxsize=1024)
