@@ -42,6 +42,7 @@ __all__ = [
     "FOOTER_LENGTH",
     "HEAD",
     "LONGEST_BODY",
+    "MAY_BE_EMPTY",
     "MESSAGE",
     "RECEIVER_MAC_LENGTH",
     "SEC_BODY",
@@ -74,7 +75,7 @@ _LONGEST_PADDING: Final = 3
 
 # As plain numbers, which compare quicker.
 SEC_BODY: Final = int(SubmessageKind.SEC_BODY)
-_MAY_BE_EMPTY: Final = (int(SubmessageKind.PAD), int(SubmessageKind.INFO_TS))
+MAY_BE_EMPTY: Final = (int(SubmessageKind.PAD), int(SubmessageKind.INFO_TS))
 
 _ENCRYPTED_KINDS: Final = frozenset(kind.to_wire() for kind in TransformationKind if kind.encrypts)
 
@@ -170,6 +171,6 @@ def _find_postfix(envelope: Envelope, octets: Octets, at: int) -> int:
         if kind == envelope.postfix:
             return at
         # A length of 0 says "to the end of the message", where no postfix can follow.
-        if kind == envelope.prefix or (length == 0 and kind not in _MAY_BE_EMPTY):
+        if kind == envelope.prefix or (length == 0 and kind not in MAY_BE_EMPTY):
             raise MalformedMessage(f"no {envelope.name}_POSTFIX", element="envelope", offset=at)
         at += 4 + (length if flags & 1 else swapped(length))

@@ -17,7 +17,7 @@ from ddsi.spi import Octets, Outcome, Rejected
 from ddsi.structure.errors import MalformedMessage
 
 from .aes_gcm import LARGE, decrypt_joined
-from .envelope import HEAD, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, read_envelope, swapped
+from .envelope import HEAD, MAY_BE_EMPTY, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, read_envelope, swapped
 from .received_keys import KeyRing
 from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, Protection
 
@@ -116,7 +116,10 @@ def _find_receiver_mac(octets: bytes | memoryview, at: int, end: int, key_id: by
 def _check_submessage(plain: _Plain) -> None:
     """One submessage and nothing else, and none that is an envelope itself."""
     kind, flags, length = HEAD.unpack_from(plain)
-    if length and (length if flags & 1 else swapped(length)) != len(plain) - 4:
+    if not flags & 1:
+        length = swapped(length)
+    # A length of 0 says "to the end", but of those that may be empty.
+    if length != len(plain) - 4 and (length or kind in MAY_BE_EMPTY):
         raise MalformedMessage(f"{len(plain)} octets are not one submessage", element="envelope")
     if kind in _ENVELOPE_KINDS:
         raise MalformedMessage("an envelope within an envelope", element="envelope")

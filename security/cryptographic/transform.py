@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import cast
+from typing import Final, cast
 
 from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
@@ -29,6 +29,8 @@ from .session_keys import ReceiverKey, SendingKey
 from .transformation import NO_KEY_ID
 
 __all__ = ["AesGcmGmacTransform"]
+
+_NO_RECEIVER: Final = Refused("its origin is to be authenticated, and there is no receiver that could")
 
 
 class AesGcmGmacTransform:
@@ -106,7 +108,11 @@ class AesGcmGmacTransform:
         key, protection = sending_participant_crypto.key, sending_participant_crypto.protection
         if key is None or protection is None:
             return NO_KEY
-        receivers = _receiver_keys(receiving_participant_crypto_list) if protection.origin_authenticated else ()
+        receivers: Sequence[ReceiverKey] = ()
+        if protection.origin_authenticated:
+            receivers = _receiver_keys(receiving_participant_crypto_list)
+            if not receivers:
+                return _NO_RECEIVER
         return sealing.seal_message(encoded_rtps_message, plain_rtps_message, key, receivers)
 
     # --- inwards ---------------------------------------------------------------------------------------------
@@ -194,7 +200,11 @@ def _encode_submessage(
     key, protection = sender.submessage_key, sender.submessage
     if key is None or protection is None:
         return NO_KEY
-    receiver_keys = _receiver_keys(receivers) if protection.origin_authenticated else ()
+    receiver_keys: Sequence[ReceiverKey] = ()
+    if protection.origin_authenticated:
+        receiver_keys = _receiver_keys(receivers)
+        if not receiver_keys:
+            return _NO_RECEIVER
     return sealing.seal_submessage(buffer, submessage, key, receiver_keys)
 
 
