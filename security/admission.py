@@ -118,7 +118,9 @@ class AdmissionDesk:
         def validate(
             auth_request: DataHolder,
         ) -> RemoteIdentity | Refused | Pending[RemoteIdentity | Refused]:
-            return authentication.validate_remote_identity(auth_request, own.identity, identity_token, remote.guid)
+            return authentication.validate_remote_identity(
+                auth_request, own.identity, identity_token, remote.guid, remote_vendor_id=remote.data.vendor_id
+            )
 
         return Handshake(
             authentication,

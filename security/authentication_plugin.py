@@ -109,10 +109,10 @@ class Authentication(Protocol):
     ) -> RemoteIdentity | Refused | Pending[RemoteIdentity | Refused]:
         """§8.3.2.11.3.  A participant was discovered that announces an identity token.
 
-        ``remote_auth_request_token`` is NIL if none has come; when one comes later, it is brought by a further call,
-        which gives the same handle.  The lower Guid of the two begins the handshake.  ``remote_vendor_id`` is that of
-        the RTPS header, None if it is not known: not the OMG's, but vendors differ in what octets they take, and the
-        prefix of a secured participant's Guid does not tell the vendor.
+        ``remote_auth_request_token`` is NIL if none has come.  The lower Guid of the two begins the handshake.  Another
+        call for the same participant gives another handle, by which it is authenticated anew.  ``remote_vendor_id`` is
+        that of the RTPS header, None if it is not known: not the OMG's, but vendors differ in what octets they take,
+        and the prefix of a secured participant's Guid does not tell the vendor.
         """
         ...
 

@@ -22,7 +22,10 @@ __all__ = ["LocalIdentityHandle", "RemoteIdentityHandle"]
 
 
 class LocalIdentityHandle(IdentityHandle):
-    """Who we are.  ``credential`` is the signed permissions document that goes to peers as ``c.perm``."""
+    """Who we are.  ``credential`` is the signed permissions document that goes to peers as ``c.perm``.
+
+    ``peers`` are the remote identities in use.  A participant has more than one while it authenticates anew.
+    """
 
     __slots__ = ("anchors", "certificate", "credential", "guid", "identity_token", "key", "peers", "pem", "valid_until")
 
@@ -35,7 +38,22 @@ class LocalIdentityHandle(IdentityHandle):
         self.identity_token: Final = identity_token
         self.valid_until: Final = min(material.certificate.valid_until, material.authority.valid_until)
         self.credential = b""
-        self.peers: Final[dict[Guid, RemoteIdentityHandle]] = {}
+        self.peers: Final[dict[Guid, list[RemoteIdentityHandle]]] = {}
+
+    def add(self, remote: RemoteIdentityHandle) -> None:
+        self.peers.setdefault(remote.guid, []).append(remote)
+
+    def discard(self, remote: RemoteIdentityHandle) -> None:
+        handles = self.peers.get(remote.guid, [])
+        if remote in handles:
+            handles.remove(remote)
+        if not handles:
+            self.peers.pop(remote.guid, None)
+
+    def certificate_of(self, guid: Guid) -> Certificate | None:
+        """What a participant proved itself with; None if it never did."""
+        proven = (remote.peer for remote in self.peers.get(guid, ()) if remote.peer is not None)
+        return next((peer.certificate for peer in proven), None)
 
     def __repr__(self) -> str:
         return f"<LocalIdentityHandle {self.certificate.subject} {self.guid}>"
@@ -51,18 +69,25 @@ class RemoteIdentityHandle(IdentityHandle):
     __slots__ = ("guid", "identity_token", "its_challenge", "local", "our_challenge", "peer", "vendor_id")
 
     def __init__(
-        self, local: LocalIdentityHandle, guid: Guid, identity_token: IdentityToken, vendor_id: VendorId | None
+        self,
+        local: LocalIdentityHandle,
+        guid: Guid,
+        identity_token: IdentityToken,
+        vendor_id: VendorId | None,
+        *,
+        our_challenge: bytes | None,
+        its_challenge: bytes | None,
     ) -> None:
         self.local: Final = local
         self.guid: Final = guid
         self.identity_token: Final = identity_token
         self.vendor_id: Final = vendor_id
-        self.our_challenge: bytes | None = None
-        self.its_challenge: bytes | None = None
+        self.our_challenge: Final = our_challenge
+        self.its_challenge: Final = its_challenge
         self.peer: Peer | None = None
 
     def expected(self, now: int) -> Expected:
-        known = self.peer.certificate if self.peer is not None else None
+        known = self.local.certificate_of(self.guid)
         return Expected(self.guid, self.identity_token, self.its_challenge, known, self.local.anchors, now)
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ _LONGEST_REASON: Final = 1000
 
 
 class NotTrusted(Exception):
-    """Never leaves this package: what it says of a peer becomes ``Refused``, of our own material ConfigurationError.
+    """Never leaves this package: what it says of a peer becomes Refused, of our own material ConfigurationError.
 
     The text is for people, begins in lower case and holds no secret.  Names in it are often a stranger's: it is cut,
     and what would not print, such as line ends or a terminal's commands, is escaped.

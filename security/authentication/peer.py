@@ -35,7 +35,7 @@ class Expected:
     """What is known of a participant before it proves itself, and whom we believe, at one moment.
 
     ``challenge``: the one that it promised, None if it promised none.  ``certificate``: the one that it proved itself
-    with before, None if it never did.
+    with before and may not change, None if it never did.
     """
 
     guid: Guid

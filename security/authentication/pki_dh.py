@@ -97,10 +97,7 @@ class PkiDhAuthentication:
         *,
         remote_vendor_id: VendorId | None = None,
     ) -> RemoteIdentity | Refused:
-        """Again for the same peer, to bring its AuthRequest: the handle and our own challenge stay, and its first one.
-
-        A peer that announces another identity token is another one, with a handle of its own.
-        """
+        """Each call gives a handle of its own, with a challenge of its own: a peer may authenticate anew."""
         local = _kept(LocalIdentityHandle, local_identity_handle)
         try:
             if class_id_suffix(remote_identity_token.class_id).startswith("+"):
@@ -110,15 +107,17 @@ class PkiDhAuthentication:
             return Refused(str(error))
         if remote_participant_guid == local.guid:
             return Refused("it bears our own Guid")
-        remote = local.peers.get(remote_participant_guid)
-        if remote is None or remote.identity_token != remote_identity_token:
-            remote = RemoteIdentityHandle(local, remote_participant_guid, remote_identity_token, remote_vendor_id)
-            local.peers[remote_participant_guid] = remote
-        if remote.its_challenge is None:
-            remote.its_challenge = received
-        if received is None and remote.our_challenge is None:
-            remote.our_challenge = self._entropy(CHALLENGE_OCTETS)
-        request = auth_request_token(remote.our_challenge) if received is None and remote.our_challenge else NIL
+        promised = self._entropy(CHALLENGE_OCTETS) if received is None else None
+        remote = RemoteIdentityHandle(
+            local,
+            remote_participant_guid,
+            remote_identity_token,
+            remote_vendor_id,
+            our_challenge=promised,
+            its_challenge=received,
+        )
+        local.add(remote)
+        request = NIL if promised is None else auth_request_token(promised)
         result = (
             ValidationResult.PENDING_HANDSHAKE_REQUEST
             if local.guid < remote.guid
@@ -252,8 +251,7 @@ class PkiDhAuthentication:
             identity_handle.key.close()
             return
         remote = _kept(RemoteIdentityHandle, identity_handle)
-        if remote.local.peers.get(remote.guid) is remote:
-            del remote.local.peers[remote.guid]
+        remote.local.discard(remote)
 
     def return_sharedsecret_handle(self, sharedsecret_handle: SharedSecretHandle) -> None:
         sharedsecret_handle.wipe()

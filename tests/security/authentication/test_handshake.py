@@ -11,6 +11,7 @@ from ddsi.structure.errors import PreconditionNotMet
 from ddsi.structure.vendor import CYCLONE, FAST_DDS, OPENDDS, OUR_VENDOR_ID, RTI, VendorId
 from ddsi_security.authentication.algorithms import DH_MODP_2048_256, ECDH_P256, ECDH_P384
 from ddsi_security.authentication.der import read_integer
+from ddsi_security.authentication.handshake_tokens import auth_request_token
 from ddsi_security.plugins import Pending, RemoteIdentity, ValidationResult
 from ddsi_security.tokens import NIL, DataHolder
 
@@ -264,40 +265,59 @@ def test_the_lower_guid_begins() -> None:
         both.initiator.plugin.begin_handshake_reply(NIL, both.replier_seen, both.initiator.identity, b"")
 
 
-def auth_request(side: Side, other: Side, received: DataHolder = NIL) -> DataHolder:
+def auth_request(side: Side, other: Side) -> tuple[RemoteIdentity, DataHolder]:
+    """``side`` meets the other and promises a challenge."""
     token = other.plugin.get_identity_token(other.identity)
-    found = side.plugin.validate_remote_identity(received, side.identity, token, other.guid)
+    found = side.plugin.validate_remote_identity(NIL, side.identity, token, other.guid)
     assert isinstance(found, RemoteIdentity)
-    return found.auth_request_token
+    return found, found.auth_request_token
 
 
-@pytest.mark.parametrize("who_knows", ["nobody", "initiator", "replier", "both"])
-def test_a_promised_challenge_is_kept(who_knows: str) -> None:
+def test_a_promise_is_kept_and_answered_by_none() -> None:
+    """The AuthRequest of either, or of both, or of none, may have arrived when the peer is validated."""
+    for of_initiator, of_replier in itertools.product([False, True], repeat=2):
+        both = pair()
+        initiator, replier = both.initiator, both.replier
+        both.replier_seen = initiator.meet(replier)
+        promise = auth_request_token(both.replier_seen.our_challenge or b"")
+        both.initiator_seen = replier.meet(initiator, promise if of_initiator else NIL)
+        assert (both.initiator_seen.our_challenge is None) == of_initiator
+        if of_replier and both.initiator_seen.our_challenge is not None:
+            both.replier_seen = initiator.meet(replier, auth_request_token(both.initiator_seen.our_challenge))
+            assert both.replier_seen.our_challenge is None
+        requested = both.request()
+        replied = done(both.reply(message(requested)))
+        done(initiator.plugin.process_handshake(message(replied), requested.handle))
+        for seen, token, name in (
+            (both.replier_seen, requested, "challenge1"),
+            (both.initiator_seen, replied, "challenge2"),
+        ):
+            assert message(token).binary_property(name) == seen.our_challenge or seen.our_challenge is None
+
+
+def test_the_promise_itself() -> None:
     alice, bob = Side(identity("alice"), seed=1), Side(identity("bob"), seed=2)
-    of_alice, of_bob = auth_request(alice, bob), auth_request(bob, alice)
-    assert len(of_alice.binary_property("future_challenge") or b"") == 32
-    assert of_alice.class_id == "DDS:Auth:PKI-DH:1.0+AuthReq"
-    if who_knows in ("initiator", "both"):
-        assert auth_request(alice, bob, of_bob) == NIL, "who has the peer's needs to send none"
-    if who_knows in ("replier", "both"):
-        assert auth_request(bob, alice, of_alice) == NIL
-    both = Pair(alice, bob)
-    requested = both.request()
-    assert message(requested).binary_property("challenge1") == of_alice.binary_property("future_challenge")
-    replied = done(both.reply(message(requested)))
-    assert message(replied).binary_property("challenge2") == of_bob.binary_property("future_challenge")
-    done(alice.plugin.process_handshake(message(replied), requested.handle))
+    _, token = auth_request(alice, bob)
+    assert token.class_id == "DDS:Auth:PKI-DH:1.0+AuthReq"
+    assert [(name, len(octets)) for name, octets in token.binary_properties] == [("future_challenge", 32)]
+    assert auth_request(alice, bob)[1] != token, "who authenticates anew, promises anew"
 
 
 def test_another_challenge_than_the_promised_one_is_refused() -> None:
-    alice, bob = Side(identity("alice"), seed=1), Side(identity("bob"), seed=2)
-    auth_request(bob, alice, auth_request(alice, bob))
-    both = Pair(alice, bob)
+    both = pair()
+    both.initiator_seen = both.replier.meet(both.initiator, auth_request_token(both.replier_seen.our_challenge or b""))
     forged = replaced(message(both.request()), "challenge1", bytes(32))
     assert "challenge1 is not the one expected" in refusal(both.reply(forged))
-    # A second AuthRequest does not displace the first.
-    auth_request(bob, alice, DataHolder("DDS:Auth:PKI-DH:1.0+AuthReq", (), (("future_challenge", bytes(32)),)))
-    assert refusal(both.reply(forged))
+    both.initiator_seen = both.replier.meet(both.initiator)
+    other = both.initiator.meet(both.replier, auth_request_token(bytes(32)))
+    request = message(both.request())
+    both.replier_seen = other
+    requested = both.request()
+    replied = done(both.reply(message(requested)))
+    assert "challenge2 is not the one expected" in refusal(
+        both.initiator.plugin.process_handshake(message(replied), requested.handle)
+    )
+    assert request != message(requested)
 
 
 @pytest.mark.parametrize(
@@ -360,21 +380,29 @@ def test_a_certificate_does_not_help_whom_it_does_not_name() -> None:
 
 def test_another_certificate_for_the_same_subject_is_refused_once_one_was_believed() -> None:
     both = pair()
-    both.run()
     finished, _ = both.run()
     both.initiator.plugin.get_shared_secret(finished.handle)
-    requested = both.request()
-    replied = done(both.reply(message(requested)))
-    done(both.initiator.plugin.process_handshake(message(replied), requested.handle))
     renewed = Side(identity("bob", "RSA"), seed=2)
     assert renewed.guid == both.replier.guid
-    changed = Pair(both.initiator, renewed)
-    changed.replier_seen.peer = both.replier_seen.peer
-    requested = changed.request()
-    replied = done(changed.reply(message(requested)))
-    assert "another certificate than before" in refusal(
-        changed.initiator.plugin.process_handshake(message(replied), requested.handle)
-    )
+    anew = Pair(both.initiator, renewed)
+    requested = anew.request()
+    replied = message(done(anew.reply(message(requested))))
+    judge = both.initiator.plugin.process_handshake
+    assert "another certificate than before" in refusal(judge(replied, requested.handle))
+    both.initiator.plugin.return_identity_handle(both.replier_seen)
+    assert done(judge(replied, requested.handle)), "it was forgotten, and is another participant now"
+
+
+def test_a_participant_may_authenticate_anew_beside_what_was_agreed() -> None:
+    both = pair()
+    finished, _ = both.run()
+    secret = both.initiator.plugin.get_shared_secret(finished.handle).shared_secret
+    anew = Pair(both.initiator, both.replier)
+    assert anew.replier_seen is not both.replier_seen
+    again, _ = anew.run()
+    assert both.initiator.plugin.get_shared_secret(again.handle).shared_secret != secret
+    both.initiator.plugin.return_identity_handle(both.replier_seen)
+    assert both.initiator.plugin.get_subject_name(anew.replier_seen) == "CN=bob,O=Peers"
 
 
 # --- handles --------------------------------------------------------------------------------------------------
