@@ -81,13 +81,13 @@ class Matchmaker:
         for writer in self._engine.user_writers(data.topic_name):
             if data.guid in writer.behavior.readers:
                 self._unmatch_reader(writer, data.guid, reason, now)
-            self._drop(writer.guid, data.guid)
+            self._withdraw(writer.guid, data.guid)
 
     def remote_writer_gone(self, data: DiscoveredWriterData, reason: LossReason, now: float) -> None:
         for reader in self._engine.user_readers(data.topic_name):
             if data.guid in reader.behavior.writers:
                 self.unmatch_writer(reader, data.guid, reason, now)
-            self._drop(reader.guid, data.guid)
+            self._withdraw(reader.guid, data.guid)
 
     def is_matched(self, data: DiscoveredEndpointData) -> bool:
         """Does a local endpoint have a match with this remote one?"""
@@ -306,6 +306,7 @@ class Matchmaker:
 
     def _refused(self, local: Guid, remote: Guid, topic_name: str, refusal: MatchRefusal) -> bool:
         """Remember it; returns whether it is news."""
+        self._no_longer_pending(local, remote)
         if self.refusals.get((local, remote)) == refusal:
             return False
         self.refusals[(local, remote)] = refusal
@@ -313,14 +314,23 @@ class Matchmaker:
         return True
 
     def _note_matched(self, local: Guid, remote: Guid, topic_name: str) -> None:
-        self._drop(local, remote)
-        self._engine.recorder.matched(local, remote, topic_name)
-
-    def _drop(self, local: Guid, remote: Guid) -> None:
         self.refusals.pop((local, remote), None)
         self._pending.discard((local, remote))
+        self._engine.recorder.matched(local, remote, topic_name)
+
+    def _withdraw(self, local: Guid, remote: Guid) -> None:
+        """The remote endpoint is gone: neither is it refused nor does it wait."""
+        self.refusals.pop((local, remote), None)
+        self._no_longer_pending(local, remote)
+
+    def _no_longer_pending(self, local: Guid, remote: Guid) -> None:
+        """The hooks asked us to wait for a pair that will not be one: they forget its keys as they would a match's."""
+        if (local, remote) in self._pending:
+            self._pending.discard((local, remote))
+            self._engine.hooks.unmatch(local, remote)
 
     def _forget(self, local: Guid) -> None:
         for pair in [pair for pair in self.refusals if local in pair]:
             del self.refusals[pair]
-        self._pending = {pair for pair in self._pending if local not in pair}
+        for pair in [pair for pair in self._pending if local in pair]:
+            self._no_longer_pending(*pair)

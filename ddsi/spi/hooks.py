@@ -96,7 +96,8 @@ class SendMessage:
 class Compute:
     """Effect: run ``job`` in a worker thread and give its result to :meth:`SecurityHooks.computed`.
 
-    ``generation`` tells under which incarnation of ``subject`` it was asked; results for peers gone are dropped.
+    ``generation`` tells under which incarnation of ``subject`` it was asked; results for peers gone are dropped.  The job
+    does not raise: what goes wrong in it is part of its result.
     """
 
     subject: Guid
@@ -181,11 +182,15 @@ class SecurityHooks(Protocol):
         """May the local endpoint match the remote one (§8.4.2.9.10-11, §8.5.1.7.3-6)?  PENDING: keys are under way.
 
         Asked for pairs of builtin endpoints too, but SPDP's.  Before a participant is admitted only its
-        ParticipantStatelessMessage endpoints are asked about.
+        ParticipantStatelessMessage endpoints are asked about.  Asked again of a pair that is pending, or was refused,
+        when one of the two has changed.
         """
         ...
 
-    def unmatch(self, local: Guid, remote: Guid) -> None: ...
+    def unmatch(self, local: Guid, remote: Guid) -> None:
+        """A pair that was admitted, or pending, is one no more.  Not for each pair of a participant that is lost, of
+        which :meth:`remote_participant_lost` tells."""
+        ...
 
     # --- messages and the clock --------------------------------------------------------------------------
 

@@ -36,7 +36,7 @@ from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReade
 from ddsi.structure.errors import NotAllowedBySecurity
 from ddsi.structure.guid import Guid, GuidPrefix
 from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import KeepAll, Reliable, TransientLocal
+from ddsi.structure.qos_policies import KeepAll, Partition, Reliable, TransientLocal
 from ddsi.structure.status import SecurityRefused
 from ddsi.trace.reasons import DropReason
 
@@ -227,6 +227,32 @@ def test_a_pending_pair_waits_for_its_decision(admission: Admission) -> None:
     hooks.effects.append(Decided(reader.guid, writer.guid, ADMITTED))  # nobody waits any more
     b.pump()
     assert reader.matched_count == (admission is ADMITTED)
+
+
+@pytest.mark.parametrize("event", ["remote gone", "local gone", "no longer fits"])
+def test_a_pair_that_ends_while_it_is_pending_is_unmatched_and_never_matched(event: str) -> None:
+    domain, a, b, hooks = pair()
+    hooks.matches = PENDING
+    writer = a.writer("Square", RELIABLE)
+    reader = b.reader("Square", RELIABLE)
+    domain.run(1)
+    assert "unmatch" not in hooks.asked
+    match event:
+        case "remote gone":
+            writer.delete()
+        case "local gone":
+            reader.delete()
+        case _:
+            qos = replace(writer.local.data.qos, partition=Partition("elsewhere"))
+            writer.local.data = replace(writer.local.data, qos=qos)
+            a.engine.discovery.announce_writer(writer.local, a.now)
+            a.pump()
+    domain.run(1)
+    assert hooks.asked.count("unmatch") == 1
+    hooks.effects.append(Decided(reader.guid, writer.guid, ADMITTED))
+    b.pump()
+    assert reader.matched_count == 0
+    assert writer.guid not in b.engine.remote_writers
 
 
 def test_a_refused_pair_is_kept_with_its_reason() -> None:

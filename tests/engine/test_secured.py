@@ -391,6 +391,20 @@ def test_a_participant_that_was_lost_and_comes_back_is_authenticated_again() -> 
     assert domain.run_until(lambda: len(reader.taken) == 1, 5)
 
 
+def test_keys_that_come_after_a_participant_is_lost_match_nothing() -> None:
+    domain = Domain()
+    a, b = node(domain, withholds=True), node(domain)
+    domain.run(1)
+    awaited = list(hooks_of(b).pending)
+    assert len(awaited) == 8, "both endpoints of the four secure topics with keys of their own"
+    a.close()
+    domain.network.unplug(a.host)
+    assert domain.run_until(lambda: not b.engine.participants, 300)
+    hooks_of(b).effects += [Decided(local, remote, ADMITTED) for local, remote in awaited]
+    b.pump()
+    assert b.engine.remote_writers == {}
+
+
 def test_a_forged_huge_number_does_not_stop_the_handshake() -> None:
     """RTPS 2.5 §8.4.11: the reader of the stateless topic has no memory that could be poisoned."""
     domain = Domain()
