@@ -16,11 +16,15 @@ __all__ = ["certificate_pem", "certificate_validity", "is_authority", "is_issued
 def parse_certificate(pem: bytes, where: str) -> x509.Certificate:
     """The first certificate of a PEM file.  Raises ConfigurationError naming ``where``."""
     try:
-        return x509.load_pem_x509_certificate(pem)
+        certificate = x509.load_pem_x509_certificate(pem)
+        # The library reads these when they are asked for, and complains only then.
+        _ = certificate.subject, certificate.issuer, certificate.public_key(), certificate.extensions
+        _ = certificate_validity(certificate)
     except (ValueError, UnsupportedAlgorithm) as error:
         raise ConfigurationError(
             f"{where} cannot be read as a certificate: it must be PEM, beginning with -----BEGIN CERTIFICATE-----"
         ) from error
+    return certificate
 
 
 def certificate_pem(certificate: x509.Certificate) -> bytes:

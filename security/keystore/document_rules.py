@@ -21,7 +21,7 @@ from .document import DocumentKind, is_signed, parse_document, unverified
 from .file_set import read_file
 from .finding import Finding, Rule, Severity
 
-__all__ = ["RULES", "LoadedDocument", "check_document"]
+__all__ = ["INVALID", "RULES", "LoadedDocument", "check_document"]
 
 UNSIGNED: Final = Rule("document-unsigned", Severity.ERROR, "a document without a signature")
 ALTERED: Final = Rule("document-altered", Severity.ERROR, "a document was changed after it was signed")

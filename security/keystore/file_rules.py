@@ -33,7 +33,7 @@ def check_key_mode(path: Path) -> Iterator[Finding]:
         yield KEY_EXPOSED.at(
             path,
             f"the private key is open to {who} (mode {mode:04o})",
-            remedy=f"chmod 600 {path}; if others had access to this machine, make a new identity",
+            remedy=f"chmod 600 {path}; if others had access to this machine, make it anew",
         )
 
 

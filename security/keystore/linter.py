@@ -25,6 +25,7 @@ from .certificate_rules import (
     check_shared_authority,
 )
 from .document import DocumentKind
+from .document_rules import INVALID as DOCUMENT_INVALID
 from .document_rules import LoadedDocument, check_document
 from .file_rules import check_key_mode, check_writable, missing
 from .file_set import read_file
@@ -99,7 +100,7 @@ class _Linter:
 
     def _add(self, findings: Iterable[Finding]) -> None:
         for finding in findings:
-            key = (finding.rule.id, finding.path.resolve(), finding.line, finding.text)
+            key = (finding.rule.id, os.path.realpath(finding.path), finding.line, finding.text)
             if key not in self._seen:
                 self._seen.add(key)
                 self.findings.append(finding)
@@ -128,12 +129,9 @@ class _Linter:
             self._add([missing(path, "the identity's private key", _make_identity(enclave))])
             return
         self._add(check_key_mode(path))
-        octets = read_file(path)
-        if b"ENCRYPTED" in octets:
-            self._add(check_key(path, None, None))
-            return
         try:
-            key = parse_private_key(octets, str(path))
+            octets = read_file(path)
+            key = None if b"ENCRYPTED" in octets else parse_private_key(octets, str(path))
         except ConfigurationError as error:
             self._add([KEY_UNREADABLE.at(path, str(error), remedy=_make_identity(enclave))])
             return
@@ -151,7 +149,11 @@ class _Linter:
         self._add(check_writable(path))
         authorities = [other for other in others if other and (not signer or other[1] != signer[1])]
         found: list[Finding] = []
-        document = check_document(path, kind, signer, authorities, found.append)
+        document = None
+        try:
+            document = check_document(path, kind, signer, authorities, found.append)
+        except ConfigurationError as error:
+            found.append(DOCUMENT_INVALID.at(path, str(error), remedy="see to it that it is a readable document"))
         self._add(found)
         return document
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -145,7 +146,7 @@ def key_files(root: Path) -> list[Path]:
 def _ros_enclaves(root: Path) -> Iterator[Enclave]:
     """Folders below ``enclaves`` with the names of ROS 2, or such a folder itself."""
     below = root / ENCLAVES
-    folders = [root] if not below.is_dir() else sorted(path for path in below.rglob("*") if path.is_dir())[:_MOST_FILES]
+    folders = sorted(islice(filter(Path.is_dir, below.rglob("*")), _MOST_FILES)) if below.is_dir() else [root]
     for folder in folders:
         if (folder / "cert.pem").exists() or (folder / "key.pem").exists():
             name = folder.relative_to(below).as_posix() if folder != root else folder.resolve().name
