@@ -10,12 +10,13 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import trio
 
 from .framework import Unavailable
-from .matrix import CASES, Case, Outcome, Verdict, find_case, run_case
+from .matrix import ALL_CASES, Case, Outcome, Verdict, find_case, run_case
 from .matrix.report import write_report
 from .peers.catalogue import OURS, PEERS
 from .peers.peer import Peer
@@ -28,7 +29,7 @@ RESULTS = Path(__file__).resolve().parents[1] / "docs" / "interop"
 def main(words: Sequence[str] | None = None) -> int:
     arguments = _parse(words)
     peers = [peer for peer in PEERS if not arguments.peer or peer.name in arguments.peer]
-    cases = [find_case(name) for name in arguments.case] or list(CASES)
+    cases = _chosen(arguments.case)
     pairs = [(a, b) for a in peers for b in peers if not arguments.ours or OURS in (a, b)]
     for peer in peers:
         _announce(peer)
@@ -45,9 +46,26 @@ def main(words: Sequence[str] | None = None) -> int:
     return min(100, len(failures) + missing)
 
 
+def _chosen(patterns: Sequence[str]) -> list[Case]:
+    """All cases, or those that the patterns name.  A pattern that names none is an error."""
+    if not patterns:
+        return list(ALL_CASES)
+    found = {pattern: [case for case in ALL_CASES if fnmatchcase(case.name, pattern)] for pattern in patterns}
+    for pattern, cases in found.items():
+        if not cases:
+            find_case(pattern)
+    return [case for case in ALL_CASES if any(case in cases for cases in found.values())]
+
+
 def _parse(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m multiproc_tests.interop", description=__doc__)
-    parser.add_argument("--case", action="append", default=[], metavar="NAME", help="only this case; may be repeated")
+    parser.add_argument(
+        "--case",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="only this, or all that a pattern fits; may be repeated",
+    )
     parser.add_argument("--peer", action="append", default=[], metavar="NAME", help="only between these peers")
     parser.add_argument("--ours", action="store_true", help="only pairs with ours in them")
     parser.add_argument("--jobs", type=int, default=2, help="cases played at a time (default: 2)")

@@ -5,15 +5,18 @@ A case that does not need keys runs without them, so that every peer can take pa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
+from ..framework import Capture, Weather
 from ..peers.options import Options
 from ..peers.peer import Ability
 from .stories import Story, deliver, deliver_late, deliver_some, refuse, say_goodbye
 
-__all__ = ["CASES", "Case", "find_case"]
+__all__ = ["CASES", "Case"]
 
 MEBIBYTE = 1 << 20
 
@@ -31,12 +34,29 @@ class Case:
     subscriber: Mapping[str, Any] = field(default_factory=dict)
     is_quick: bool = False
     """Part of every test run, with each peer in both roles; the others run on request."""
+    quick_pairs: frozenset[tuple[str, str]] = frozenset()
+    """Part of every test run with these publishers and subscribers only."""
+    keystore: Callable[[], Path] | None = None
+    """The folder that the options' keystores are in; made when it is first asked for."""
+    evidence: Callable[[Capture], Sequence[str]] | None = None
+    """What the capture of the play lacks, a line each; without it nothing is captured."""
+    weather: Weather | None = None
+    """Two hosts and this between them, instead of one."""
 
     def publisher_options(self) -> Options:
-        return replace(self.options, **self.publisher)
+        return self._with_keystore(replace(self.options, **self.publisher))
 
     def subscriber_options(self) -> Options:
-        return replace(self.options, **self.subscriber)
+        return self._with_keystore(replace(self.options, **self.subscriber))
+
+    def is_quick_for(self, publisher: str, subscriber: str) -> bool:
+        """Is it part of every test run with these two?"""
+        return self.is_quick or (publisher, subscriber) in self.quick_pairs
+
+    def _with_keystore(self, options: Options) -> Options:
+        if self.keystore is None or options.keystore is None:
+            return options
+        return replace(options, keystore=os.fspath(self.keystore() / options.keystore))
 
 
 KEYLESS = Options(keyless=True)
@@ -215,11 +235,3 @@ CASES = (
         subscriber={"partitions": ("south",)},
     ),
 )
-
-
-def find_case(name: str) -> Case:
-    """The case of that name; KeyError tells the names there are."""
-    for case in CASES:
-        if case.name == name:
-            return case
-    raise KeyError(f"no case {name!r}; there are {', '.join(case.name for case in CASES)}")

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
 from ..framework import (
+    Capture,
     DeadlineExceeded,
     ExpectationFailed,
     Namespace,
     Unavailable,
     capture,
     namespace,
+    relayed_namespaces,
     scenario,
 )
 from ..peers.peer import Peer
@@ -26,6 +29,7 @@ from .stories import Cast
 __all__ = ["Outcome", "Verdict", "missing_ability", "play", "run_case"]
 
 CASE_DEADLINE = 60.0
+WEATHER_SEED = 20
 
 
 class Verdict(Enum):
@@ -68,20 +72,44 @@ async def play(case: Case, publisher: Peer, subscriber: Peer, *, captures: Path 
     publisher.locate()  # compiled before the clock runs
     subscriber.locate()
     title = f"{case.name}-{publisher}-{subscriber}"
-    with namespace() as host:
-        async with _capturing(host, captures, title), scenario(title, deadline=CASE_DEADLINE) as stage:
-            options = case.publisher_options(), case.subscriber_options()
-            await case.story(Cast(stage, host, host, publisher, subscriber, *options))
+    options = case.publisher_options(), case.subscriber_options()
+    with _hosts(case) as (here, there), tempfile.TemporaryDirectory() as scratch:
+        folder = captures if captures or case.evidence is None else Path(scratch)
+        async with _capturing(here, folder, title) as captured, scenario(title, deadline=CASE_DEADLINE) as stage:
+            await case.story(Cast(stage, here, there, publisher, subscriber, *options))
+        if case.evidence is not None:
+            assert captured is not None
+            _check_evidence(case.evidence(captured))
+
+
+@contextmanager
+def _hosts(case: Case) -> Iterator[tuple[Namespace, Namespace]]:
+    """One host for both, or two with bad weather between them; its record is a note of what then fails."""
+    if case.weather is None:
+        with namespace() as host:
+            yield host, host
+        return
+    with relayed_namespaces("pub", "sub", weather=case.weather, seed=WEATHER_SEED) as (hosts, relay):
+        try:
+            yield hosts["pub"], hosts["sub"]
+        except AssertionError as error:
+            error.add_note(relay.report())
+            raise
+
+
+def _check_evidence(shortcomings: Sequence[str]) -> None:
+    if shortcomings:
+        raise ExpectationFailed(f"in the capture: {'; '.join(shortcomings)}")
 
 
 @asynccontextmanager
-async def _capturing(host: Namespace, folder: Path | None, title: str) -> AsyncIterator[None]:
+async def _capturing(host: Namespace, folder: Path | None, title: str) -> AsyncIterator[Capture | None]:
     if folder is None:
-        yield
+        yield None
     else:
         folder.mkdir(parents=True, exist_ok=True)
-        async with capture(host, folder / f"{title}.pcapng"):
-            yield
+        async with capture(host, folder / f"{title}.pcapng") as captured:
+            yield captured
 
 
 async def run_case(case: Case, publisher: Peer, subscriber: Peer, *, captures: Path | None = None) -> Outcome:

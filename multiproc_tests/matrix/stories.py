@@ -7,13 +7,26 @@ too late or twice is still seen.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..framework import ExpectationFailed, Namespace, Process, Scenario
 from ..peers.options import Options
 from ..peers.peer import Peer
 
-__all__ = ["Cast", "Story", "deliver", "deliver_late", "deliver_some", "refuse", "say_goodbye"]
+__all__ = [
+    "Cast",
+    "Story",
+    "deliver",
+    "deliver_late",
+    "deliver_some",
+    "deliver_to_all",
+    "deliver_to_newcomer",
+    "deliver_to_two",
+    "refuse",
+    "restart_publisher",
+    "restart_subscriber",
+    "say_goodbye",
+]
 
 STEP_TIMEOUT = 20.0
 """Seconds for a step on a quiet host; a step also gets what the programs' own option ``-w`` gives them."""
@@ -50,7 +63,17 @@ Story = Callable[[Cast], Awaitable[None]]
 async def deliver(cast: Cast) -> None:
     """Everything written is received, once and in order, and acknowledged; so are a dispose and an unregister."""
     subscriber = await cast.start_subscriber()
+    await _deliver(cast, await cast.start_publisher(), subscriber)
+
+
+async def deliver_to_newcomer(cast: Cast) -> None:
+    """The same where the publisher is there first."""
     publisher = await cast.start_publisher()
+    await publisher.expect("GUID .*", timeout=cast.patience)
+    await _deliver(cast, publisher, await cast.start_subscriber())
+
+
+async def _deliver(cast: Cast, publisher: Process, subscriber: Process) -> None:
     await _open_gate(cast, publisher, subscriber)
     await publisher.expect("HOLDING", timeout=cast.patience)
     await subscriber.expect("HOLDING", timeout=cast.patience)
@@ -58,7 +81,58 @@ async def deliver(cast: Cast) -> None:
     _check_gone(cast, publisher, subscriber)
     await _dismiss(publisher)
     await _dismiss(subscriber)
-    _check_received(subscriber, [match[1] for match in publisher.matches("WROTE (.*)")])
+    _check_received(subscriber, _written(publisher))
+
+
+async def deliver_to_two(cast: Cast) -> None:
+    """Two subscribers, as bob and as dave where they are secured, each get everything."""
+    as_dave = replace(cast.subscriber_options, identity="dave")
+    await deliver_to_all(cast, replace(cast, subscriber_options=as_dave))
+
+
+async def deliver_to_all(*casts: Cast) -> None:
+    """One publisher, that of the first cast, and the subscribers of all of them, who each get everything."""
+    subscribers = [await cast.start_subscriber() for cast in casts]
+    cast = casts[0]
+    publisher = await cast.start_publisher()
+    for process in (publisher, *subscribers):
+        await process.expect("HOLDING", timeout=cast.patience)
+    _check_acknowledged(cast, publisher)
+    for process in (publisher, *subscribers):
+        await _dismiss(process)
+    for subscriber in subscribers:
+        _check_received(subscriber, _written(publisher))
+
+
+async def restart_subscriber(cast: Cast) -> None:
+    """A subscriber that dies without a word comes back, and gets what is kept; nobody has forgotten anybody yet."""
+    first = await cast.start_subscriber()
+    publisher = await cast.start_publisher()
+    await publisher.expect("HOLDING", timeout=cast.patience)
+    await first.expect("HOLDING", timeout=cast.patience)
+    first.kill()
+    await first.wait()
+    second = await cast.start_subscriber()
+    await second.expect("HOLDING", timeout=cast.patience)
+    await _dismiss(second)
+    await _dismiss(publisher)
+    _check_received(second, _written(publisher))
+
+
+async def restart_publisher(cast: Cast) -> None:
+    """A publisher that dies without a word comes back: the subscriber gets all that both write."""
+    options = replace(cast.subscriber_options, count=2 * cast.subscriber_options.count)
+    subscriber = await replace(cast, subscriber_options=options).start_subscriber()
+    first = await cast.start_publisher()
+    await first.expect("HOLDING", timeout=cast.patience)
+    first.kill()
+    await first.wait()
+    second = await cast.start_publisher()
+    await second.expect("HOLDING", timeout=cast.patience)
+    await subscriber.expect("HOLDING", timeout=cast.patience)
+    await _dismiss(second)
+    await _dismiss(subscriber)
+    _check_received(subscriber, _written(first) + _written(second))
 
 
 async def deliver_some(cast: Cast) -> None:
@@ -70,7 +144,7 @@ async def deliver_some(cast: Cast) -> None:
     await publisher.expect("HOLDING", timeout=cast.patience)
     await _dismiss(publisher)
     await _dismiss(subscriber)
-    written = iter([match[1] for match in publisher.matches("WROTE (.*)")])
+    written = iter(_written(publisher))
     for sample in [match[1] for match in subscriber.matches("SAMPLE (.*)")]:
         if sample not in written:  # `in` moves the iterator on: order and number matter
             raise ExpectationFailed(f"{sample!r} was not written, or received twice, or out of order")
@@ -84,8 +158,7 @@ async def deliver_late(cast: Cast) -> None:
     await subscriber.expect("HOLDING", timeout=cast.patience)
     await _dismiss(subscriber)
     await _dismiss(publisher)
-    written = [match[1] for match in publisher.matches("WROTE (.*)")]
-    _check_received(subscriber, _latest(written, cast.publisher_options.depth), in_any_order=True)
+    _check_received(subscriber, _latest(_written(publisher), cast.publisher_options.depth), in_any_order=True)
 
 
 async def say_goodbye(cast: Cast) -> None:
@@ -124,6 +197,10 @@ async def _dismiss(process: Process) -> None:
     await process.send("leave")
     await process.expect("DONE .*")
     await process.expect_exit(0)
+
+
+def _written(publisher: Process) -> list[str]:
+    return [match[1] for match in publisher.matches("WROTE (.*)")]
 
 
 def _check_received(subscriber: Process, expected: list[str], *, in_any_order: bool = False) -> None:

@@ -66,7 +66,7 @@ CYCLONE_C = Peer(
 CYCLONE_PYTHON = Peer(
     name="cyclone11",
     title="Eclipse Cyclone DDS, Python (PyPI)",
-    abilities=frozenset(Ability),
+    abilities=frozenset(Ability) - {Ability.SECURITY},
     locate=lambda: _python_program("cyclonedds_shapes", needs="cyclonedds", package="cyclonedds==11.0.1"),
     version=lambda: _python_version("cyclonedds"),
 )

@@ -3,9 +3,9 @@
     identity_ca.pem  permissions_ca.pem  NAME.pem  NAME.key  NAME.permissions.p7s  GOVERNANCE.p7s
 
 Every governance document is for all topics of all domains.  The names decide who begins the handshake: the GUID of a
-secured participant is made of its certificate's subject (DDS-Security 1.1 §9.3.3), alice's is the lower one, and the
-lower one begins.  It is made with ``ddsi_security.keystore``, as users make theirs; so its form is tried on the others
-in passing.
+secured participant is made of its certificate's subject (DDS-Security 1.1 §9.3.3), alice is below bob and bob below
+dave, and the lower one begins.  The keystore is made with ``ddsi_security.keystore``, as users make theirs; so its form
+is tried on the others in passing.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ GOVERNANCES: Final[Mapping[str, GovernanceDraft]] = MappingProxyType(
         "no-access-control": _governance("E", "E", "S", "E", "E", is_strict=False),
     }
 )  # fmt: skip
-"""What ``reference`` results of the vendors with each other exist for: every kind at every level, and their sum."""
+"""Every kind at every level alone, the usual sums of them, and everything at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class PeerKeystore:
 
     @classmethod
     def create(cls, folder: Path, algorithm: Algorithm = Algorithm.EC) -> PeerKeystore:
-        """Authorities, alice, bob and carol with all rights, and all governance documents."""
+        """Authorities, alice, bob and dave with all rights, and all governance documents."""
         identity_ca, permissions_ca = (
             Authority.create(parse_name(f"/O=Peers/CN={name}"), algorithm, _validity())
             for name in ("identity_ca", "permissions_ca")
@@ -120,7 +120,7 @@ class PeerKeystore:
         folder.mkdir(parents=True, exist_ok=True)
         keystore.add("identity_ca.pem", certificate_pem(identity_ca.certificate))
         keystore.add("permissions_ca.pem", certificate_pem(permissions_ca.certificate))
-        for name in ("alice", "bob", "carol"):
+        for name in ("alice", "bob", "dave"):
             keystore.add_identity(name)
         for name, draft in GOVERNANCES.items():
             keystore.add_governance(name, draft)

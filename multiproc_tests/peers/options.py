@@ -32,7 +32,8 @@ class Options:
     unicast: bool = False
     gate: bool = False
     hold: bool = True
-    keystore: str = ""
+    keystore: str | None = None
+    """A folder (``keystore.py``); without one, nothing is secured."""
     identity: str = "alice"
     governance: str = "governance.p7s"
 
@@ -47,7 +48,7 @@ class Options:
             words += ["-P", ",".join(self.partitions)]
         if self.blob_octets is not None:
             words += ["-B", str(self.blob_octets)]
-        if self.keystore:
+        if self.keystore is not None:
             words += ["-k", self.keystore, "-p", self.identity, "-g", self.governance]
         flags = {
             "-b": self.best_effort,

@@ -34,6 +34,7 @@ class Ability(Enum):
     UNICAST = "discovery without multicast"
     LARGE = "samples of a MiB"
     PARTITIONS = "partitions"
+    SECURITY = "DDS Security"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
