@@ -45,6 +45,7 @@ _EC = "1.2.840.10045.2.1"
 _RSA_WITH = {"1.2.840.113549.1.1.11": "sha256", "1.2.840.113549.1.1.12": "sha384", "1.2.840.113549.1.1.13": "sha512"}
 _ECDSA_WITH = {"1.2.840.10045.4.3.2": "sha256", "1.2.840.10045.4.3.3": "sha384", "1.2.840.10045.4.3.4": "sha512"}
 _LEAST_RSA_BITS = 2048
+_LEAST_EC_BITS = 256
 _MOST_SALT = 512
 _MOST_ATTRIBUTES = 64
 
@@ -217,11 +218,11 @@ def _check_signature(
     try:
         key = certificate.public_key()
         if isinstance(key, rsa.RSAPublicKey) and (algorithm in (_RSA, _RSA_PSS) or algorithm in _RSA_WITH):
-            if key.key_size < _LEAST_RSA_BITS:
-                raise NotSignedBy(f"the permissions CA's RSA key has {key.key_size} bits; {_LEAST_RSA_BITS} are needed")
+            _check_key_size(key.key_size, _LEAST_RSA_BITS)
             scheme = _pss(parameters, digest) if algorithm == _RSA_PSS else padding.PKCS1v15()
             key.verify(signer.signature, covered, scheme, digest)
         elif isinstance(key, ec.EllipticCurvePublicKey) and (algorithm == _EC or algorithm in _ECDSA_WITH):
+            _check_key_size(key.key_size, _LEAST_EC_BITS)
             key.verify(signer.signature, covered, ec.ECDSA(digest))
         else:
             raise NotSignedBy(f"its signature algorithm, {algorithm}, does not fit the permissions CA's key")
@@ -229,6 +230,11 @@ def _check_signature(
         raise NotSignedBy("the signature is not the permissions CA's, or it was altered after it was signed") from error
     except (UnsupportedAlgorithm, ValueError) as error:
         raise NotSignedBy(f"its signature cannot be verified: {error}") from error
+
+
+def _check_key_size(bits: int, least: int) -> None:
+    if bits < least:
+        raise NotSignedBy(f"the permissions CA's key has {bits} bits; {least} are needed")
 
 
 def _pss(parameters: memoryview, digest: hashes.HashAlgorithm) -> padding.PSS:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 
-from lxml import etree
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled, and without types)
 
 from .document_error import DocumentError, did_you_mean, shown
 
@@ -191,7 +191,7 @@ def _label(tag: str, name: str, number: int) -> str:
 
 @cache
 def _schema_text() -> bytes:
-    return (resources.files(__package__) / "documents.xsd").read_bytes()
+    return (resources.files("ddsi_security.access_control") / "documents.xsd").read_bytes()
 
 
 def _schema() -> etree.XMLSchema:

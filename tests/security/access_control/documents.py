@@ -21,7 +21,7 @@ NOW = parse_instant("2026-06-01T12:00:00Z")
 
 
 def authority(kind: str = "ec") -> tuple[x509.Certificate, PrivateKey]:
-    """A self-signed certificate and its key, the same in all tests of a run; ``kind``: ec, ec384, rsa, or rsa1024."""
+    """A self-signed certificate and its key, the same in all tests of a run; ``kind`` as for new_key."""
     return _authority(kind)
 
 
@@ -32,9 +32,11 @@ def _authority(kind: str) -> tuple[x509.Certificate, PrivateKey]:
 
 
 def new_key(kind: str) -> PrivateKey:
+    """``kind``: ec (P-256), ec384, ec224, rsa (2048 bits), or rsa1024."""
     if kind.startswith("rsa"):
         return rsa.generate_private_key(public_exponent=65537, key_size=int(kind[3:] or 2048))
-    return ec.generate_private_key(ec.SECP384R1() if kind == "ec384" else ec.SECP256R1())
+    curves = {"ec": ec.SECP256R1(), "ec384": ec.SECP384R1(), "ec224": ec.SECP224R1()}
+    return ec.generate_private_key(curves[kind])
 
 
 def certificate(
