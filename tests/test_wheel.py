@@ -25,7 +25,7 @@ IMPORT_PACKAGES = {"ddsi": ROOT / "ddsi", "ddsi_security": ROOT / "security"}
 
 def _modules(name: str, folder: Path) -> Iterator[str]:
     """The files that belong to an import package, as the wheel names them."""
-    for path in [*folder.rglob("*.py"), folder / "py.typed"]:
+    for path in [*folder.rglob("*.py"), *folder.rglob("*.xsd"), folder / "py.typed"]:
         yield f"{name}/{path.relative_to(folder).as_posix()}"
 
 
