@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
@@ -190,7 +190,7 @@ class Side:
 
 def settle(result: T | Pending[T]) -> T:
     """Run the slow half inline."""
-    return result.job() if isinstance(result, Pending) else result
+    return cast("T", result.job()) if isinstance(result, Pending) else result
 
 
 def done(result: HandshakeStep | Refused | Pending[HandshakeStep | Refused]) -> HandshakeStep:
