@@ -66,6 +66,8 @@ def _words(qos: EndpointQos) -> Iterator[str]:
         yield "/".join(representation.name for representation in qos.data_representation.ids)
     if qos.type_consistency.kind == p.TypeConsistency.DISALLOW_TYPE_COERCION:
         yield "no type coercion"
+    if qos.data_tags.tags:
+        yield f"tags {' '.join(repr(f'{name}={value}') for name, value in qos.data_tags.tags)}"
     for name in ("user_data", "topic_data", "group_data"):
         if octets := getattr(qos, name).value:
             yield f"{name.replace('_', ' ')} {len(octets)} B"

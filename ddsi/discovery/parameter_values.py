@@ -124,11 +124,11 @@ class ParameterValues:
         return self.read(ParameterId.PROPERTY_LIST, _read_properties, ())
 
     def security_parameters(self) -> tuple[tuple[int, bytes], ...]:
-        """The first of each parameter that the security plugins read, as little-endian octets."""
+        """The first of each parameter that the security plugins alone read, as little-endian octets."""
         return tuple(
             (pid, to_little_endian(pid, value, little_endian=self.little_endian))
             for pid, value in self._first.items()
-            if pid in SECURITY_PARAMETER_IDS
+            if pid in SECURITY_PARAMETER_IDS and pid != ParameterId.DATA_TAGS  # which is a policy
         )
 
 

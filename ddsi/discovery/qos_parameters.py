@@ -1,6 +1,7 @@
 """The QoS policies as parameters of SEDP: one table, read in both directions.
 
-RTPS 2.5 §9.6.4 (table of parameters and their types), DDS-XTypes 1.3 §7.6.3.1 and §7.6.3.4.  A policy that a peer
+RTPS 2.5 §9.6.4 (table of parameters and their types), DDS-XTypes 1.3 §7.6.3.1 and §7.6.3.4, DDS-Security 1.1 §7.2.5
+(data tags).  A policy that a peer
 leaves out has that policy's default.  We announce each policy, defaults too: stacks differ in theirs.
 """
 
@@ -22,6 +23,7 @@ __all__ = ["MAX_PARTITIONS", "read_reader_qos", "read_writer_qos", "write_reader
 
 MAX_PARTITIONS = 256
 _MAX_REPRESENTATIONS = 64
+_MAX_TAGS = 256
 
 _DEFAULT = EndpointQos()
 # RTPS 2.5 §9.6.4 with DDS-XTypes 1.3 §7.6.3.1.1: who names no representation has XCDR1 and nothing else.
@@ -151,6 +153,17 @@ def _write_partition(writer: Writer, policy: p.Partition) -> None:
 
 def _read_partition(reader: Reader) -> p.Partition:
     return p.Partition(*(reader.string() for _ in range(reader.sequence_length(most=MAX_PARTITIONS))))
+
+
+def _write_data_tags(writer: Writer, policy: p.DataTags) -> None:
+    writer.sequence_length(len(policy.tags))
+    for name, value in policy.tags:
+        writer.string(name)
+        writer.string(value)
+
+
+def _read_data_tags(reader: Reader) -> p.DataTags:
+    return p.DataTags(*((reader.string(), reader.string()) for _ in range(reader.sequence_length(most=_MAX_TAGS))))
 
 
 def _write_history(writer: Writer, policy: p.History) -> None:
@@ -306,6 +319,7 @@ _COMMON = (
     _octets("user_data", _PID.USER_DATA, p.UserData),
     _octets("topic_data", _PID.TOPIC_DATA, p.TopicData),
     _octets("group_data", _PID.GROUP_DATA, p.GroupData),
+    _PolicyCodec("data_tags", _PID.DATA_TAGS, _write_data_tags, _read_data_tags, unless_default=True),
     _PolicyCodec(
         "data_representation",
         _PID.DATA_REPRESENTATION,

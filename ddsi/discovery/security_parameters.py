@@ -13,7 +13,7 @@ from ..serialization.parameter_id import ParameterId
 __all__ = ["to_big_endian", "to_little_endian"]
 
 _MAX_ELEMENTS = 256
-"""Properties or tags in one value."""
+"""Properties in one value."""
 
 _DATA_HOLDERS = (ParameterId.IDENTITY_TOKEN, ParameterId.PERMISSIONS_TOKEN, ParameterId.IDENTITY_STATUS_TOKEN)
 
@@ -29,16 +29,12 @@ def to_big_endian(pid: int, value: Octets) -> bytes:
 
 
 def _swapped(pid: int, value: Octets, *, to_little_endian: bool) -> bytes:
-    """Three shapes occur: DataHolder (string, properties of text, properties of octets), a sequence of tags
-    (string, string), and uint32s.
-    """
+    """Two shapes occur: DataHolder (string, properties of text, properties of octets), and uint32s."""
     reader, writer = Reader(value, little_endian=not to_little_endian), Writer(little_endian=to_little_endian)
     if pid in _DATA_HOLDERS:
         writer.string(reader.string())
         _swap_texts(reader, writer)
         _swap_octets(reader, writer)
-    elif pid == ParameterId.DATA_TAGS:
-        _swap_texts(reader, writer)
     else:
         for _ in range(reader.remaining // 4):
             writer.u32(reader.u32())

@@ -96,8 +96,8 @@ class SendMessage:
 class Compute:
     """Effect: run ``job`` in a worker thread and give its result to :meth:`SecurityHooks.computed`.
 
-    ``generation`` tells under which incarnation of ``subject`` it was asked; results for peers gone are dropped.  The job
-    does not raise: what goes wrong in it is part of its result.
+    ``generation`` tells under which incarnation of ``subject`` it was asked; results for peers gone are dropped.  The
+    job does not raise: what goes wrong in it is part of its result.
     """
 
     subject: Guid

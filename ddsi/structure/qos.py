@@ -40,6 +40,7 @@ class Qos:
     user_data: p.UserData | None = None
     topic_data: p.TopicData | None = None
     group_data: p.GroupData | None = None
+    data_tags: p.DataTags | None = None
     transport_priority: p.TransportPriority | None = None
     entity_factory: p.EntityFactory | None = None
     writer_data_lifecycle: p.WriterDataLifecycle | None = None
@@ -102,6 +103,7 @@ _ALLOWED: dict[str, tuple[type, ...]] = {
     "user_data": (p.UserData,),
     "topic_data": (p.TopicData,),
     "group_data": (p.GroupData,),
+    "data_tags": (p.DataTags,),
     "transport_priority": (p.TransportPriority,),
     "entity_factory": (p.EntityFactory,),
     "writer_data_lifecycle": (p.WriterDataLifecycle,),
@@ -137,6 +139,7 @@ class EndpointQos:
     user_data: p.UserData = p.UserData()
     topic_data: p.TopicData = p.TopicData()
     group_data: p.GroupData = p.GroupData()
+    data_tags: p.DataTags = p.DataTags()
     transport_priority: p.TransportPriority = p.TransportPriority()
     writer_data_lifecycle: p.WriterDataLifecycle = p.WriterDataLifecycle()
     reader_data_lifecycle: p.ReaderDataLifecycle = p.ReaderDataLifecycle()

@@ -26,6 +26,7 @@ __all__ = [
     "BySourceTimestamp",
     "DataRepresentation",
     "DataRepresentationId",
+    "DataTags",
     "Deadline",
     "DestinationOrder",
     "Durability",
@@ -366,6 +367,25 @@ class GroupData:
 
     def __post_init__(self) -> None:
         _check_octets("GroupData", self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class DataTags:
+    """What an endpoint's data are, in words that permissions may ask for: ``DataTags(("classification", "secret"))``.
+
+    DDS-Security 1.1 §7.2.5 (DataTagQosPolicy).  Announced, and checked when endpoints are made and discovered; nothing
+    compares them with the data.  An endpoint keeps those that it was made with.
+    """
+
+    tags: tuple[tuple[str, str], ...] = ()
+
+    def __init__(self, *tags: tuple[str, str]) -> None:
+        for tag in tags:
+            if not isinstance(tag, tuple) or len(tag) != 2 or not all(isinstance(text, str) for text in tag):
+                raise BadParameter(f"a data tag is a pair of str, name and value, not {tag!r}")
+            if not tag[0]:
+                raise BadParameter(f"the data tag {tag!r} has no name")
+        object.__setattr__(self, "tags", tags)
 
 
 @dataclass(frozen=True, slots=True)

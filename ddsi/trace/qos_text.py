@@ -32,12 +32,13 @@ def policy_text(policy: object) -> str:
     if isinstance(policy, Enum):
         return policy.name
     if isinstance(policy, tuple):
-        return ", ".join(policy_text(item) for item in policy)
+        return f"({', '.join(policy_text(item) for item in policy)})"
     if not is_dataclass(policy):
         return repr(policy)
     values = [(item.name, getattr(policy, item.name)) for item in fields(policy)]
     # Partition("a", "b") and DataRepresentation(XCDR1) take what they hold one by one.
     arguments = (
-        policy_text(value) if isinstance(value, tuple) else f"{name}={policy_text(value)}" for name, value in values
+        policy_text(value)[1:-1] if isinstance(value, tuple) else f"{name}={policy_text(value)}"
+        for name, value in values
     )
     return f"{type(policy).__name__}({', '.join(arguments)})"

@@ -38,6 +38,8 @@ CASES = [
      {"presentation": {"access_scope": "TOPIC", "coherent_access": True, "ordered_access": False}}),
     ({"partition": p.Partition("a", "b*")}, "best-effort, volatile, partition 'a' 'b*'",
      {"partition": {"names": ["a", "b*"]}}),
+    ({"data_tags": p.DataTags(("class", "secret"), ("by", "us"))}, "best-effort, volatile, tags 'class=secret' 'by=us'",
+     {"data_tags": {"tags": [["class", "secret"], ["by", "us"]]}}),
     ({"data_representation": p.DataRepresentation(2)}, "best-effort, volatile, XCDR2",
      {"data_representation": {"ids": ["XCDR2"]}}),
     ({"data_representation": p.DataRepresentation(0)}, "best-effort, volatile",

@@ -346,6 +346,13 @@ POLICIES: list[tuple[str, ParameterId, Any, str, str]] = [
     ("user_data", PID.USER_DATA, p.UserData(b"abc"), "03000000 61626300", "00000003 61626300"),
     ("topic_data", PID.TOPIC_DATA, p.TopicData(b"abcd"), "04000000 61626364", "00000004 61626364"),
     ("group_data", PID.GROUP_DATA, p.GroupData(b"\0"), "01000000 00000000", "00000001 00000000"),
+    (
+        "data_tags",
+        PID.DATA_TAGS,
+        p.DataTags(("a", "x"), ("b", "")),
+        "02000000  02000000 61000000  02000000 78000000  02000000 62000000  01000000 00000000",
+        "00000002  00000002 61000000  00000002 78000000  00000002 62000000  00000001 00000000",
+    ),
     ("entity_name", PID.ENTITY_NAME, "me", "03000000 6d650000", "00000003 6d650000"),
     ("data_representation", PID.DATA_REPRESENTATION, XCDR1, "01000000 00000000", "00000001 00000000"),
     (
@@ -667,11 +674,6 @@ SECURITY: list[tuple[int, str, str]] = [
            00000001 00000002 64000000 00000001 65000000""",
     ),
     (PID.PERMISSIONS_TOKEN, "02000000 61000000 00000000 00000000", "00000002 61000000 00000000 00000000"),
-    (
-        PID.DATA_TAGS,
-        "01000000 02000000 61000000 02000000 62000000",
-        "00000001 00000002 61000000 00000002 62000000",
-    ),
     (PID.ENDPOINT_SECURITY_INFO, "01000080 02000080", "80000001 80000002"),
     (PID.ENDPOINT_SYMMETRIC_CIPHER_ALGO, "01000000", "00000001"),
 ]
@@ -756,6 +758,7 @@ qos_values = st.builds(
     user_data=st.binary(max_size=9).map(p.UserData),
     topic_data=st.binary(max_size=9).map(p.TopicData),
     group_data=st.binary(max_size=9).map(p.GroupData),
+    data_tags=st.lists(st.tuples(names.filter(bool), names), max_size=3).map(lambda tags: p.DataTags(*tags)),
     data_representation=st.lists(st.sampled_from(p.DataRepresentationId), min_size=1, unique=True).map(
         lambda ids: p.DataRepresentation(*ids)
     ),

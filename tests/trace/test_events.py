@@ -12,6 +12,7 @@ from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import (
     DataRepresentation,
     DataRepresentationId,
+    DataTags,
     KeepAll,
     Partition,
     Reliable,
@@ -127,6 +128,7 @@ def test_discovery_events_are_made_from_discovered_data() -> None:
         partition=Partition("a", "b*"),
         data_representation=DataRepresentation(DataRepresentationId.XCDR2, DataRepresentationId.XCDR1),
         user_data=UserData(b"mine"),
+        data_tags=DataTags(("class", "secret"), ("by", "us")),
     )
     writer = DiscoveredWriterData(guid=WRITER, topic_name="Square", type_name="ShapeType", qos=qos)
     event = e.EndpointCreated.of(1.0, A, writer)
@@ -135,5 +137,6 @@ def test_discovery_events_are_made_from_discovered_data() -> None:
         ("reliability", "Reliable(max_blocking_time=0.1)"),
         ("history", "KeepAll()"),
         ("partition", "Partition('a', 'b*')"),
+        ("data_tags", "DataTags(('class', 'secret'), ('by', 'us'))"),
         ("data_representation", "DataRepresentation(XCDR2, XCDR1)"),
     )
