@@ -6,9 +6,8 @@ hostile: reading one raises NotTrusted and nothing else.  Whether it is to be be
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime, timedelta
 from typing import Final
 
 from cryptography import x509
@@ -55,8 +54,10 @@ _NANOSECONDS: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """``subject`` is RFC 4514 text, ``subject_der`` the octets of the Name.  Valid from ``valid_from`` to
-    ``valid_until`` (exclusive), nanoseconds since 1970.  Equal if its octets are."""
+    """``subject`` is RFC 4514 text, ``subject_der`` the octets of the Name.  Equal if its octets are.
+
+    Valid from ``valid_from`` to ``valid_until`` (exclusive), in nanoseconds since 1970.
+    """
 
     subject: str
     issuer: str
@@ -149,16 +150,21 @@ class Certificate:
 
 
 def pem_blocks(text: bytes, label: str) -> list[tuple[int, bytes]]:
-    """The PEM blocks with this label, each with the line on which it begins, from 1."""
+    """The PEM blocks with this label, each with the line on which it begins, from 1.  Takes linear time."""
     begin, end = f"-----BEGIN {label}-----".encode(), f"-----END {label}-----".encode()
-    return [
-        (text.count(b"\n", 0, match.start()) + 1, match.group())
-        for match in re.finditer(re.escape(begin) + b".*?" + re.escape(end), text, re.DOTALL)
-    ]
+    blocks: list[tuple[int, bytes]] = []
+    position, line = 0, 1
+    while (start := text.find(begin, position)) >= 0 and (stop := text.find(end, start)) >= 0:
+        line += text.count(b"\n", position, start)
+        position = stop + len(end)
+        blocks.append((line, text[start:position]))
+        line += text.count(b"\n", start, position)
+    return blocks
 
 
 def text_of_time(nanoseconds: int) -> str:
-    return datetime.fromtimestamp(nanoseconds // _NANOSECONDS, UTC).isoformat().replace("+00:00", "Z")
+    # Counted from 1970, as not every system's fromtimestamp() takes what lies before.
+    return (datetime(1970, 1, 1) + timedelta(seconds=nanoseconds // _NANOSECONDS)).isoformat() + "Z"
 
 
 def _nanoseconds(time: datetime) -> int:

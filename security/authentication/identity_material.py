@@ -87,15 +87,16 @@ def _certificates_in(name: str, where: str, text: bytes) -> list[Certificate]:
 
 def _trusted_directory(properties: Mapping[str, str], own: tuple[Certificate, ...]) -> tuple[Certificate, ...]:
     """The CAs whose participants we believe, all in one directory; empty if none is configured."""
-    path = properties.get(TRUSTED_CA_DIR, "").removeprefix("file:")
-    if not path:
+    given = properties.get(TRUSTED_CA_DIR, "")
+    if not given:
         return ()
+    path = resource_name(given) if given.startswith("file:") else given
     if properties.get(IDENTITY_CRL):
         raise ConfigurationError(
             f"properties {TRUSTED_CA_DIR} and {IDENTITY_CRL} exclude each other: a revocation list is one CA's"
         )
     trusted: list[Certificate] = []
-    for file in _files(path.removeprefix("//") if path.startswith("///") else path):
+    for file in _files(path):
         text = read_resource(TRUSTED_CA_DIR, f"file:{file}")
         if pem_blocks(text, _CERTIFICATE):
             trusted += _certificates_in(TRUSTED_CA_DIR, str(file), text)

@@ -48,7 +48,7 @@ class TokenKey:
         self._key: Any = None
         pkcs11 = _imported(name)
         with _errors(name, uri, pkcs11), _library(name, uri.module, pkcs11) as library:
-            self._find(library, pkcs11)
+            self._log_in(library, pkcs11)
 
     def sign(self, content: bytes) -> bytes:
         pkcs11 = _imported(self._name)
@@ -70,7 +70,7 @@ class TokenKey:
             with _library(self._name, self._uri.module, pkcs11), suppress(pkcs11.PKCS11Error):
                 self._session.close()
 
-    def _find(self, library: Any, pkcs11: ModuleType) -> None:
+    def _log_in(self, library: Any, pkcs11: ModuleType) -> None:
         session = _open(self._name, library, self._uri, pkcs11)
         try:
             self._key = _find(self._name, session, self._uri, pkcs11.ObjectClass.PRIVATE_KEY)
@@ -81,7 +81,7 @@ class TokenKey:
 
     def _sign_again(self, content: bytes, library: Any, pkcs11: ModuleType) -> bytes:
         try:
-            self._find(library, pkcs11)
+            self._log_in(library, pkcs11)
             return self._sign(content, pkcs11)
         except (ConfigurationError, pkcs11.PKCS11Error) as error:
             raise NotTrusted(f"our hardware token does not sign any more: {type(error).__name__}") from error

@@ -372,6 +372,7 @@ def test_blocks_are_found_with_their_lines() -> None:
     text = b"a\n-----BEGIN X-----\nb\n-----END X-----\n\n-----BEGIN Y-----\n-----END Y-----\n-----BEGIN X-----"
     assert [line for line, _ in pem_blocks(text, "X")] == [2]
     assert [line for line, _ in pem_blocks(text, "Y")] == [6]
+    assert [line for line, _ in pem_blocks(text.replace(b"Y", b"X"), "X")] == [2, 6]
 
 
 def test_times_are_compared_in_utc() -> None:
