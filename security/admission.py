@@ -286,13 +286,15 @@ class AdmissionDesk:
             self._own.crypto, handshake.remote_identity, permissions, shared_secret
         )
         subject = self._plugins.authentication.get_subject_name(handshake.remote_identity)
-        if handshake is remote.renewal:
+        if remote.standing is Standing.ADMITTED:
             self._return_credentials(remote)
-            remote.handshake, remote.renewal, remote.permissions = handshake, None, permissions
+            if handshake is remote.renewal:
+                if remote.handshake is not None:
+                    remote.handshake.close()
+                remote.handshake, remote.renewal = handshake, None
+            remote.permissions = permissions
             self._keys.renew(remote, crypto, shared_secret)
-            self._log(
-                LogLevel.NOTICE_LEVEL, f"participant {remote.guid}, {subject}, authenticated anew", "authenticated"
-            )
+            self._log(LogLevel.NOTICE_LEVEL, f"{remote.guid}, {subject}, authenticated anew", "authenticated")
         else:
             remote.crypto, remote.shared_secret, remote.permissions = crypto, shared_secret, permissions
             remote.standing, remote.reason = Standing.ADMITTED, ""
@@ -318,9 +320,10 @@ class AdmissionDesk:
         """Wipe what can be wiped; the key that the two share goes last of the keys."""
         self._keys.forget(remote)
         self._return_credentials(remote)
-        if remote.renewal is not None:
-            remote.renewal.close()
-            remote.renewal = None
+        for handshake in (remote.handshake, remote.renewal):
+            if handshake is not None:
+                handshake.close()
+        remote.handshake = remote.renewal = None
 
     def _return_credentials(self, remote: RemoteParticipant) -> None:
         """What the plugins gave us when it authenticated."""
@@ -330,9 +333,6 @@ class AdmissionDesk:
         if remote.shared_secret is not None:
             self._plugins.authentication.return_sharedsecret_handle(remote.shared_secret)
             remote.shared_secret = None
-        if remote.handshake is not None:
-            remote.handshake.close()
-            remote.handshake = None
 
     # --- what ends while it is used ----------------------------------------------------------------------
 

@@ -6,10 +6,11 @@ the messages loses, repeats and reorders them, and anybody can write to it.  Fro
 * whoever waits says again what it said last, unchanged, ever more slowly (:data:`RESEND_FIRST_S` to
   :data:`RESEND_LAST_S`);
 * a repeated request gets the same reply again and a repeated reply the same final, also when all is done;
+* the final is said again until the peer shows that it has the secret (:meth:`Handshake.confirm`): nothing answers it;
 * a message that does not verify changes nothing: its reason is reported, and for a moment nothing more is looked at,
   so that a flood of bad messages costs little;
 * another request while the final is awaited is answered too, beside the first: requests are not signed, so neither
-  of the two can be said to be the true one before its final comes (:data:`MAX_REPLIES`);
+  of the two can be said to be the true one before its final comes (:data:`MAX_REPLIES`); and both may be;
 * after :data:`LIMIT_S` it is given up and begun anew, later each time;
 * one that is done answers repeats and nothing else.  Who has lost his state begins another, beside the first, which
   takes its place when it is done as well (:meth:`Handshake.is_begun_anew_by`).
@@ -54,12 +55,14 @@ __all__ = [
 GREETING_S: Final = 0.01
 """Until the first request: the peer must have learnt of us, or it ignores what we write."""
 RESEND_FIRST_S: Final = 0.1
-RESEND_LAST_S: Final = 2.0
+RESEND_LAST_S: Final = 1.0
 LIMIT_S: Final = 100.0
 """How long one attempt may take (Cyclone DDS: the same)."""
 RETRY_FIRST_S: Final = 10.0
 RETRY_LAST_S: Final = 300.0
 MAX_REPLIES: Final = 4
+MAX_FINALS: Final = 20
+"""A peer that needs no keys of ours, and has none for us, never confirms."""
 _DEAF_FIRST_S: Final = 0.005
 _DEAF_LAST_S: Final = 1.0
 
@@ -75,6 +78,7 @@ class State(Enum):
     AWAIT_FINAL = "the reply is sent"
     REPLYING_AGAIN = "a second request came; a reply to it is being made"
     VERIFYING_FINAL = "the peer's final is being verified"
+    VERIFYING_ANOTHER = "a final to another reply of ours is being verified"
     AUTHENTICATED = "the peer has proved who it is"
     FAILED = "given up; begun anew after a pause"
 
@@ -125,6 +129,7 @@ TRANSITIONS: Final[dict[tuple[State, Event], tuple[Action, State]]] = {
     (_S.VERIFYING_REPLY, _E.READY): (_A.FINISH, _S.AUTHENTICATED),
     (_S.VERIFYING_REPLY, _E.REFUSED): (_A.REPORT, _S.AWAIT_REPLY),
     (_S.AUTHENTICATED, _E.REPLY_AGAIN): (_A.RESEND, _S.AUTHENTICATED),
+    (_S.AUTHENTICATED, _E.TIMEOUT): (_A.RESEND, _S.AUTHENTICATED),
     # the replier
     (_S.AWAIT_REQUEST, _E.TIMEOUT): (_A.RESEND, _S.AWAIT_REQUEST),
     (_S.AWAIT_REQUEST, _E.REQUEST): (_A.MAKE_REPLY, _S.REPLYING),
@@ -140,6 +145,9 @@ TRANSITIONS: Final[dict[tuple[State, Event], tuple[Action, State]]] = {
     (_S.REPLYING_AGAIN, _E.REFUSED): (_A.REPORT, _S.AWAIT_FINAL),
     (_S.VERIFYING_FINAL, _E.READY): (_A.FINISH, _S.AUTHENTICATED),
     (_S.VERIFYING_FINAL, _E.REFUSED): (_A.REPORT, _S.AWAIT_FINAL),
+    (_S.AUTHENTICATED, _E.FINAL): (_A.VERIFY, _S.VERIFYING_ANOTHER),
+    (_S.VERIFYING_ANOTHER, _E.READY): (_A.FINISH, _S.AUTHENTICATED),
+    (_S.VERIFYING_ANOTHER, _E.REFUSED): (_A.REPORT, _S.AUTHENTICATED),
     # another attempt
     (_S.FAILED, _E.TIMEOUT): (_A.BEGIN, _S.VALIDATING),
 }
@@ -173,7 +181,7 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Authenticated:
-    """The peer is who it says; ``handle`` gives the shared secret and its credentials."""
+    """The peer is who it says; ``handle`` gives the shared secret and its credentials, instead of any before."""
 
     handle: HandshakeHandle
 
@@ -229,16 +237,18 @@ class Handshake:
         self._due = math.inf
         self._limit = math.inf
         self._resend_s = RESEND_FIRST_S
+        self._finals = 0
+        self._is_confirmed = False
         self._retry_s = RETRY_FIRST_S
         self._deaf_until = -math.inf
         self._deaf_s = _DEAF_FIRST_S
         self._last_reason = ""
         self._auth_request = NIL  # the peer's
         self._last_sent: Send | None = None
-        self._exchanges: list[_Exchange] = []
+        self._exchanges: list[_Exchange] = []  # not verified yet
+        self._done: _Exchange | None = None
         self._message: GenericMessage | None = None  # being worked on
         self._tried = 0  # how many exchanges the final in work did not fit
-        self._verified: DataHolder | None = None
         self._request: DataHolder | None = None  # the one that our verified reply answered
 
     # --- inputs ------------------------------------------------------------------------------------------
@@ -278,6 +288,12 @@ class Handshake:
         self._settle(result, now)
         return self._drain()
 
+    def confirm(self) -> None:
+        """Something came under the secret that the two share: the peer has all that it needs."""
+        if self.state is State.AUTHENTICATED:
+            self._is_confirmed = True
+            self._due = math.inf
+
     def handle_timeout(self, now: float) -> list[Output]:
         if now >= self._limit and (self.state, Event.LIMIT) in TRANSITIONS:
             self._last_reason = self._last_reason or f"no {self._missing()} came within {LIMIT_S:g} s"
@@ -294,9 +310,10 @@ class Handshake:
 
     def close(self) -> None:
         """The peer is gone: whatever the plugin holds of it is returned."""
-        for exchange in self._exchanges:
+        for exchange in [*self._exchanges, *([self._done] if self._done is not None else [])]:
             self._authentication.return_handshake_handle(exchange.handle)
         self._exchanges.clear()
+        self._done = None
         if self.remote_identity is not None:
             self._authentication.return_identity_handle(self.remote_identity)
             self.remote_identity = None
@@ -327,7 +344,7 @@ class Handshake:
                 self._tried = 0
                 self._verify(now)
             case Action.FINISH:
-                self._finish()
+                self._finish(now)
             case Action.REPORT:
                 self._report(now)
             case Action.GIVE_UP:
@@ -375,7 +392,8 @@ class Handshake:
                 self._stepped(result)
                 self._step(Event.READY, now)
             case Refused(reason):
-                if self.state is State.VERIFYING_FINAL and self._tried + 1 < len(self._exchanges):
+                is_final = self.state in (State.VERIFYING_FINAL, State.VERIFYING_ANOTHER)
+                if is_final and self._tried + 1 < len(self._exchanges):
                     self._tried += 1
                     self._verify(now)
                     return
@@ -396,12 +414,12 @@ class Handshake:
         received = self._token() if self._message is not None else NIL
         related = self._message.message_identity if self._message is not None else NO_MESSAGE
         sent = Send(AUTH, step.message, related) if step.message is not None else None
-        if self.state in (State.VERIFYING_REPLY, State.VERIFYING_FINAL):
+        if self.state in (State.VERIFYING_REPLY, State.VERIFYING_FINAL, State.VERIFYING_ANOTHER):
             chosen = self._exchanges.pop(-1 - self._tried)
-            self._request = chosen.received if self.state is State.VERIFYING_FINAL else None
-            self._forget_exchanges()
-            self._exchanges.append(_Exchange(received, sent or chosen.sent, step.handle))
-            self._verified = received
+            self._request = chosen.received if self.state is not State.VERIFYING_REPLY else None
+            if self._done is not None:
+                self._authentication.return_handshake_handle(self._done.handle)
+            self._done = _Exchange(received, sent or chosen.sent, step.handle)
         elif sent is not None:
             if len(self._exchanges) == MAX_REPLIES:
                 self._authentication.return_handshake_handle(self._exchanges.pop(0).handle)
@@ -409,12 +427,14 @@ class Handshake:
         self._last_sent = sent
         self._message = None
 
-    def _finish(self) -> None:
-        if self._last_sent is not None:
-            self._out.append(self._last_sent)
+    def _finish(self, now: float) -> None:
         self._due = self._limit = math.inf
+        self._resend_s = RESEND_FIRST_S
+        if self._last_sent is not None:
+            self._send(now)
         self._last_reason = ""
-        self._out.append(Authenticated(self._exchanges[-1].handle))
+        assert self._done is not None
+        self._out.append(Authenticated(self._done.handle))
 
     def _be_deaf(self, now: float) -> None:
         self._deaf_until = now + self._deaf_s
@@ -442,7 +462,9 @@ class Handshake:
     def _send(self, now: float) -> None:
         if self._last_sent is not None:
             self._out.append(self._last_sent)
-        if self.state is not State.AUTHENTICATED:
+        if self.state is State.AUTHENTICATED:
+            self._finals += 1
+        if not self._is_confirmed and self._finals < MAX_FINALS:
             self._set_resend(now)
 
     def _set_resend(self, now: float) -> None:
@@ -456,17 +478,15 @@ class Handshake:
                 if exchange.received == token:
                     self._last_sent = exchange.sent
                     return Event.REQUEST_AGAIN
-        if kind is Event.REPLY and self.state is State.AUTHENTICATED:
-            return Event.REPLY_AGAIN if token == self._verified else None
-        return kind
+        if self.state is not State.AUTHENTICATED:
+            return kind
+        is_repeated = self._done is not None and token == self._done.received
+        if kind is Event.REPLY:
+            return Event.REPLY_AGAIN if is_repeated else None
+        return None if is_repeated or (kind is Event.FINAL and not self._exchanges) else kind
 
     def _is_known(self, token: DataHolder) -> bool:
         return any(exchange.received == token for exchange in self._exchanges)
-
-    def _forget_exchanges(self) -> None:
-        for exchange in self._exchanges:
-            self._authentication.return_handshake_handle(exchange.handle)
-        self._exchanges.clear()
 
     def _missing(self) -> str:
         return {State.AWAIT_REPLY: "reply", State.AWAIT_FINAL: "final"}.get(self.state, "request")

@@ -204,6 +204,8 @@ class SecurityService:
         if change.writer_guid.entity_id == ids.PARTICIPANT_STATELESS_MESSAGE_WRITER:
             self._desk.receive(remote, message, now)
         elif remote.standing is Standing.ADMITTED:
+            if remote.handshake is not None:
+                remote.handshake.confirm()
             refusal = self._keys.receive(remote, message, now)
             self._protection.changed()
             if refusal is not None:
