@@ -18,7 +18,7 @@ from ..config.environment import load_config
 from ..config.secure import participant_properties
 from ..discovery.matching import MatchRefusal
 from ..engine import DataAvailable, DiscoveryChanged, Effect, LocalWriter, StatusChanged, WriterProgress
-from ..structure.builtin_entity_ids import SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER
+from ..structure import builtin_entity_ids as ids
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
@@ -34,7 +34,12 @@ if TYPE_CHECKING:
 __all__ = ["DomainParticipant"]
 
 _HIGHEST_DOMAIN = 232
-_SEDP_READERS = (SEDP_PUBLICATIONS_READER, SEDP_SUBSCRIPTIONS_READER)
+_SEDP_READERS = (
+    ids.SEDP_PUBLICATIONS_READER,
+    ids.SEDP_SUBSCRIPTIONS_READER,
+    ids.SEDP_PUBLICATIONS_SECURE_READER,
+    ids.SEDP_SUBSCRIPTIONS_SECURE_READER,
+)
 _LINGER_S = 1.0
 _LINGER_LOOK_S = 0.01
 
@@ -159,8 +164,8 @@ class DomainParticipant(Parent):
     # --- who is there ------------------------------------------------------------------------------------
 
     def discovered_participants(self) -> list[DiscoveredParticipantData]:
-        """The remote participants that are known now."""
-        return [proxy.data for proxy in self._running_pump().engine.participants.values()]
+        """The remote participants that are known now, without those that security has not admitted (yet)."""
+        return [proxy.data for proxy in self._running_pump().engine.participants.values() if proxy.is_admitted]
 
     def discovered_publications(self) -> list[DiscoveredWriterData]:
         """The remote writers that are known now."""
@@ -175,8 +180,8 @@ class DomainParticipant(Parent):
 
         RTPS 2.5 §8.5.4: SEDP is transient-local, so each of its writers says at the match how much there is to come.
         """
-        engine = self._running_pump().engine
-        readers = (engine.local_readers[Guid.of(engine.guid.prefix, reader_id)] for reader_id in _SEDP_READERS)
+        builtin = self._running_pump().engine.builtin
+        readers = [reader for reader_id in _SEDP_READERS if (reader := builtin.reader(reader_id)) is not None]
         return all(proxy.has_historical_data for reader in readers for proxy in reader.behavior.writers.values())
 
     def match_refusals(self) -> dict[tuple[Guid, Guid], MatchRefusal]:

@@ -5,8 +5,8 @@ leases run out.  So both tables have a bound (``Config.max_participants``, ``Con
 which a flood displaces its own kind, not those that we work with:
 
 - of participants, one that has announced no endpoint goes, the longest silent first, once it has been silent for a
-second; - of endpoints, one of the participant that announced most goes, and of these the newest that matches nothing
-here.  A
+  second; and none that security has admitted while there is one that it has not;
+- of endpoints, one of the participant that announced most goes, and of these the newest that matches nothing here.  A
   participant that already has its share of the table (the bound divided by their number) displaces nobody.
 
 Where nobody has to go, the newcomer is not stored and its sender is counted (``DropReason.TABLE_FULL_...``).
@@ -48,7 +48,8 @@ class Eviction:
         if now < self._nobody_until:
             return None  # looked through a moment ago: a flood must not make each datagram a search
         idle = [proxy for proxy in self._engine.participants.values() if proxy.endpoint_count == 0]
-        victim = min(idle, key=lambda proxy: proxy.last_heard, default=None)
+        strangers = [proxy for proxy in idle if not proxy.is_admitted]
+        victim = min(strangers or idle, key=lambda proxy: proxy.last_heard, default=None)
         if victim is not None and now - victim.last_heard >= _SILENT_S:
             return victim
         self._nobody_until = victim.last_heard + _SILENT_S if victim is not None else now + _SILENT_S

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from ddsi.config import Config
 from ddsi.discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS, BUILTIN_TOPICS
 from ddsi.discovery.parameters import encode_participant
 from ddsi.messages.data import Data
@@ -333,6 +334,19 @@ def test_a_builtin_pair_may_be_refused_after_it_was_pending() -> None:
     b.pump()
     assert b.engine.local_readers[local].behavior.writers == {}
     assert b.statuses_of(SecurityRefused) == [SecurityRefused(remote=remote, reason="the attributes differ")]
+
+
+def test_strangers_do_not_displace_whom_security_admitted() -> None:
+    """Anybody can invent participants; those that were authenticated stay, though they have announced no endpoint."""
+    domain = Domain()
+    a = domain.node(make_hooks=XorSecurity, config=Config(max_participants=4))
+    friends = [node(domain) for _ in range(2)]
+    domain.run(1)
+    strangers = [node(domain, issuer=STRANGE_ISSUER) for _ in range(4)]
+    domain.run(100)
+    known = set(a.engine.participants)
+    assert known >= {friend.guid.prefix for friend in friends}
+    assert len(known & {stranger.guid.prefix for stranger in strangers}) == 2
 
 
 # --- somebody waits, comes back, lies -------------------------------------------------------------------------------
