@@ -25,6 +25,7 @@ __all__ = ["Node", "parse_document"]
 _MOST_OCTETS = 1 << 20
 _MOST_DEPTH = 16  # the schema needs 9
 _MOST_ELEMENTS = 50_000
+_LONGEST_TAG = 100  # as errors show it; the schema's are shorter
 _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
 _MUST_INTERPRET = "must_interpret"
 # Only encodings in which < is 0x3C: what follows looks for <!DOCTYPE in the octets.
@@ -175,7 +176,7 @@ def _node(root: etree._Element, document: str, line_offset: int) -> Node:
                 numbers[tag] = numbers.get(tag, 0) + 1
                 label = ", ".join(filter(None, (rule, _label(tag, child.get("name", ""), numbers[tag]))))
             children.append(build(child, depth + 1, label))
-        tag, text = str(element.tag), (element.text or "").strip(" \t\r\n")
+        tag, text = str(element.tag)[:_LONGEST_TAG], (element.text or "").strip(" \t\r\n")
         return Node(document, tag, text, element.get("name", ""), line, rule, may_be_ignored, tuple(children))
 
     return build(root, 1, "")
