@@ -19,10 +19,12 @@ class DocumentError(ConfigurationError):
     """A document that cannot be used.
 
     ``document``: its name as the caller gave it.  ``line``: of the file, from 1; 0 where no line is to blame.
-    ``rule``: the grant or rule in which it stands, or "".  ``reason``: what is wrong.  ``remedy``: what to do, or "".
+    ``rule``: the grant or rule in which it stands, or "".  ``reason``: what is wrong, in one
+    line that prints, whatever of the document it quotes.  ``remedy``: what to do, or "".
     """
 
     def __init__(self, document: str, reason: str, *, line: int = 0, rule: str = "", remedy: str = "") -> None:
+        reason = _printable(reason)
         where = document + (f", line {line}" if line else "") + (f", {rule}" if rule else "")
         super().__init__(f"{where}: {reason}" + (f"; {remedy}" if remedy else ""))
         self.document = document
@@ -37,6 +39,13 @@ class UntrustedDocument(DocumentError):
 
 
 _LONGEST_SHOWN = 80
+_LONGEST_REASON = 1000
+
+
+def _printable(text: str) -> str:
+    """White space as single spaces, what else does not print escaped; cut where it gets too long to read."""
+    cut = " ".join(text[:_LONGEST_REASON].split()) + ("..." if len(text) > _LONGEST_REASON else "")
+    return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in cut)
 
 
 def shown(text: str) -> str:
