@@ -20,12 +20,16 @@ EXPECTED = FOLDER / "expected.json"
 
 @dataclass(frozen=True)
 class KeptInput:
-    """``expected`` is a verdict of the target: "accepted" or the name of a refusal."""
+    """``expected``: "accepted", or the name of a refusal; perhaps with " ~ " and words that its reason must hold."""
 
     target: str
     name: str
     octets: bytes
     expected: str
+
+    def is_answered_by(self, verdict: str) -> bool:
+        name, _, words = self.expected.partition(" ~ ")
+        return verdict.partition(":")[0] == name and words.lower() in verdict.lower()
 
     def __str__(self) -> str:
         return f"{self.target}/{self.name}"

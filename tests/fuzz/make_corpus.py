@@ -12,14 +12,26 @@ import shutil
 from collections.abc import Callable, Iterator
 
 from tests.fuzz.corpus import EXPECTED, FOLDER
-from tests.fuzz.hostile_messages import MESSAGE_MAKERS
+from tests.fuzz.hostile_documents import DOCUMENT_MAKERS
+from tests.fuzz.hostile_envelopes import ENVELOPE_MAKERS
+from tests.fuzz.hostile_messages import MESSAGE_MAKERS, Made
+from tests.fuzz.hostile_tokens import TOKEN_MAKERS
+from tests.fuzz.identities import FOLDER as IDENTITIES
+from tests.fuzz.identities import make_keystore
 from tests.fuzz.targets import TARGETS
 
-MAKERS: dict[str, Callable[[], Iterator[tuple[str, bytes, str]]]] = {**MESSAGE_MAKERS}
+MAKERS: dict[str, Callable[[], Iterator[Made]]] = {
+    **MESSAGE_MAKERS,
+    **TOKEN_MAKERS,
+    **DOCUMENT_MAKERS,
+    **ENVELOPE_MAKERS,
+}
 
 
 def main() -> None:
     """Whatever does not begin with ``found-`` is made anew."""
+    if not IDENTITIES.exists():
+        make_keystore()
     expected = json.loads(EXPECTED.read_text()) if EXPECTED.exists() else {}
     made: dict[str, dict[str, str]] = {}
     for target in TARGETS:

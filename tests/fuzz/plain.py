@@ -145,7 +145,8 @@ def sample(octets: bytes) -> str:
     support = supports[octets[0] % len(supports)] if octets else supports[0]
     payload = octets[1:]
     found = verdict(lambda: support.deserialize(payload), MalformedSample)
-    assert found == verdict(lambda: support.deserialize(memoryview(payload)), MalformedSample)
+    again = verdict(lambda: support.deserialize(memoryview(payload)), MalformedSample)
+    assert found.partition(":")[0] == again.partition(":")[0], "there is one reader for each of the two"
     return found
 
 
@@ -153,13 +154,14 @@ def samples() -> Iterator[bytes]:
     """What a real peer serialised."""
     for vector in VECTORS:
         index = list(TYPES.values()).index(vector.type)
-        for octets in vector.octets.values():
-            yield bytes([index]) + octets
+        for kind, octets in vector.octets.items():
+            if kind.startswith("xcdr"):
+                yield bytes([index]) + octets
 
 
 PLAIN_TARGETS = {
-    "datagram": Target(datagram, captured_datagrams, 2048),
-    "conversation": Target(conversation, conversations, 4096, good="dropped"),
+    "datagram": Target(datagram, captured_datagrams, 2048, enormous=60_000),
+    "conversation": Target(conversation, conversations, 4096, enormous=60_000, good="dropped"),
     "spdp": Target(spdp, announcements, 2048),
     "sedp_writer": Target(sedp_writer, lambda: captured_payloads(ids.SEDP_PUBLICATIONS_WRITER), 2048),
     "sedp_reader": Target(sedp_reader, lambda: captured_payloads(ids.SEDP_SUBSCRIPTIONS_WRITER), 2048),

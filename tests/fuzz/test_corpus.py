@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 import tracemalloc
 
@@ -19,12 +18,12 @@ MOST_OCTETS = 16 << 20
 @pytest.mark.parametrize("entry", list(kept()), ids=str)
 def test_it_is_answered_as_it_ought_to_be(entry: KeptInput) -> None:
     run = TARGETS[entry.target].run
-    assert run(entry.octets) == entry.expected
+    verdict = run(entry.octets)
+    assert entry.is_answered_by(verdict), f"{verdict} - and not {entry.expected}"
     # Again, now that all is imported, generated and cached that needs to be once.
     begin = time.process_time()
     run(entry.octets)
     assert time.process_time() - begin < MOST_SECONDS
-    gc.collect()
     tracemalloc.start()
     try:
         run(entry.octets)
@@ -42,9 +41,19 @@ def test_each_target_has_inputs_and_each_input_an_expectation() -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
+def test_an_enormous_input_is_answered_at_once(name: str) -> None:
+    """Mebibytes behind a good beginning, or of nothing but one octet."""
+    target = TARGETS[name]
+    for octets in (next(iter(target.seeds())) + bytes(target.enormous), b"A" * target.enormous):
+        begin = time.process_time()
+        target.run(octets)
+        assert time.process_time() - begin < MOST_SECONDS
+
+
+@pytest.mark.parametrize("name", TARGETS)
 def test_seeds_are_good_inputs(name: str) -> None:
     """Else nothing is tested but the first check of each parser."""
     target = TARGETS[name]
     verdicts = [target.run(octets) for octets in target.seeds()]
     assert verdicts
-    assert sum(verdict == target.good for verdict in verdicts) >= len(verdicts) / 2
+    assert verdicts.count(target.good) >= len(verdicts) / 2, verdicts

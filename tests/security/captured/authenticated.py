@@ -147,11 +147,14 @@ def judge_reply(
     plugin: PkiDhAuthentication, remote: RemoteIdentityHandle, handshake: h.Handshake, kx: dict[str, Any]
 ) -> HandshakeStep | Refused:
     """As if our Request had been the captured one."""
+    return finished(plugin.process_handshake(_token("Reply", handshake.reply), request_sent(remote, handshake, kx)))
+
+
+def request_sent(remote: RemoteIdentityHandle, handshake: h.Handshake, kx: dict[str, Any]) -> RequestSent:
     agreement = key_agreement_named(handshake.request["c.kagree_algo"])
     assert agreement is not None
     key = KnownKey(agreement, handshake.request["dh1"], bytes.fromhex(kx["shared_secret"]))
-    request = RequestSent(remote, _token("Req", handshake.request), handshake.hash_c1, key)
-    return finished(plugin.process_handshake(_token("Reply", handshake.reply), request))
+    return RequestSent(remote, _token("Req", handshake.request), handshake.hash_c1, key)
 
 
 def judge_request_and_final(

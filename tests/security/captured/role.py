@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from random import Random
 
 from ddsi.messages.header import HEADER_LENGTH
@@ -38,8 +39,8 @@ from ddsi_security.handles import (
     SharedSecretHandle,
 )
 from ddsi_security.properties import BUILTIN_ENDPOINT_NAME
-from tests.captures.capture import Capture
-from tests.security.captured.whole import Joined, Token
+from tests.captures.capture import Capture, load
+from tests.security.captured.whole import Joined, Token, is_volatile
 
 NOW = 1_795_305_600 * 10**9
 """A moment of 22 November 2026, when the captures were made."""
@@ -76,6 +77,30 @@ def endpoint_attributes(governance: Mapping[str, str], entity_id: EntityId) -> E
         is_key_protected=data == "ENCRYPT",
         plugin_endpoint_attributes=mask | metadata.endswith("ORIGIN_AUTHENTICATION") << 2,
     )
+
+
+# --- everybody ------------------------------------------------------------------------------------------------------
+
+
+def roles(name: str) -> list[Role]:
+    """Everybody in the capture."""
+    capture = load(name)
+    return [Role(capture, Guid(bytes.fromhex(peer["guid"]))) for peer in capture.facts["guids"]]
+
+
+@cache
+def played(name: str) -> list[Role]:
+    """Everybody, who first heard the key exchange alone, and then everything from the beginning."""
+    datagrams = load(name).datagrams
+    learned = roles(name)
+    for role in learned:
+        for number, datagram in enumerate(datagrams):
+            if is_volatile(datagram):
+                role.hear(number, datagram)
+        role.forget()
+        for number, datagram in enumerate(datagrams):
+            role.hear(number, datagram)
+    return learned
 
 
 # --- one participant ------------------------------------------------------------------------------------------------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from functools import cache
 
 import pytest
 
@@ -12,33 +11,12 @@ from ddsi.messages.raw_submessage import SubmessageKind
 from ddsi.spi import NoKeys, Outcome, Rejected
 from ddsi.structure.guid import Guid
 from tests.captures.capture import SECURED, load
-from tests.security.captured.role import Opened, Role
+from tests.security.captured.role import Opened, played, roles
 from tests.security.captured.straight import INFO_TS, submessages
-from tests.security.captured.whole import decoded, is_volatile, sample_line
+from tests.security.captured.whole import decoded, sample_line
 
 FOR_SOMEBODY_ELSE = "sec-alloa-three-cyclone"
 """Here a message may be for one of two, and the other sees that it bears no MAC for it."""
-
-
-def roles(name: str) -> list[Role]:
-    """Everybody in the capture."""
-    capture = load(name)
-    return [Role(capture, Guid(bytes.fromhex(peer["guid"]))) for peer in capture.facts["guids"]]
-
-
-@cache
-def played(name: str) -> list[Role]:
-    """Everybody, who first heard the key exchange alone, and then everything from the beginning."""
-    datagrams = load(name).datagrams
-    learned = roles(name)
-    for role in learned:
-        for number, datagram in enumerate(datagrams):
-            if is_volatile(datagram):
-                role.hear(number, datagram)
-        role.forget()
-        for number, datagram in enumerate(datagrams):
-            role.hear(number, datagram)
-    return learned
 
 
 def all_opened(name: str) -> Iterator[tuple[int, Opened]]:
