@@ -44,7 +44,9 @@ class OwnParticipant:
         self.identity = identity.handle
         self.guid = identity.adjusted_participant_guid
         self.permissions = settled(
-            access.validate_local_permissions(authentication, self.identity, candidate.domain_id, properties)
+            access.validate_local_permissions(
+                authentication, self.identity, candidate.domain_id, properties, domain_tag=candidate.domain_tag
+            )
         )
         _insist(access.check_create_participant(self.permissions, candidate.domain_id, properties))
         self.permissions_token = access.get_permissions_token(self.permissions)
