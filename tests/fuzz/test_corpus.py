@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import time
 import tracemalloc
+from pathlib import Path
 
 import pytest
 
 from tests.fuzz.corpus import FOLDER, KeptInput, expectations, kept
 from tests.fuzz.targets import TARGETS
 
+DOCUMENTATION = Path(__file__).parents[2] / "docs" / "fuzzing.md"
 MOST_SECONDS = 1.0
 MOST_OCTETS = 16 << 20
 """Of memory that Python allocates at once, whatever numbers are in the input."""
@@ -38,6 +41,12 @@ def test_each_target_has_inputs_and_each_input_an_expectation() -> None:
     assert all(expectations().values())
     files = {f"{path.parent.name}/{path.name}" for path in FOLDER.glob("*/*")}
     assert files == {str(entry) for entry in kept()}
+
+
+def test_each_target_is_explained() -> None:
+    text = DOCUMENTATION.read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    assert [name for row in rows for name in re.findall(r"`([a-z_]+)`", row.split("|")[1])] == list(TARGETS)
 
 
 @pytest.mark.parametrize("name", TARGETS)
