@@ -30,6 +30,7 @@ Here is where the parts lie.  :mod:`.sealing` puts things into envelopes, :mod:`
 from __future__ import annotations
 
 import struct
+from functools import lru_cache
 from typing import Final
 
 from ddsi.messages.raw_submessage import SubmessageKind
@@ -63,9 +64,9 @@ LONGEST_BODY: Final = 0xFFFC
 """octetsToNextHeader has 16 bits, and is a multiple of 4."""
 
 HEAD: Final = struct.Struct("<BBH")
-_PREFIX: Final = struct.Struct("<BBH4s4s12s")
-_PREFIX_AND_BODY: Final = struct.Struct("<BBH4s4s12sBBH4s")
-_POSTFIX: Final = struct.Struct("<BBH16s4s")
+_PREFIX: Final = struct.Struct("<4s4s4s12s")
+_PREFIX_AND_BODY: Final = struct.Struct("<4s4s4s12sBBH4s")
+_POSTFIX: Final = struct.Struct("<4s16s4s")
 _PREFIX_LENGTH: Final = _PREFIX.size
 _BODY_LENGTH: Final = _PREFIX_AND_BODY.size - _PREFIX_LENGTH
 """Of SEC_BODY up to the cipher text."""
@@ -90,13 +91,14 @@ A plain tuple, as every protected submessage that comes is taken apart so.
 class Envelope:
     """The submessage kinds that protected octets lie between."""
 
-    __slots__ = ("name", "postfix", "postfix_head", "prefix", "prefix_head")
+    __slots__ = ("name", "postfix", "postfix_head", "prefix", "prefix_head", "prefix_heads")
 
     def __init__(self, prefix: SubmessageKind, postfix: SubmessageKind) -> None:
         self.name = prefix.name.partition("_")[0]
         self.prefix = int(prefix)
         self.postfix = int(postfix)
         self.prefix_head = HEAD.pack(prefix, 1, HEADER_LENGTH)
+        self.prefix_heads = (self.prefix_head, struct.pack(">BBH", prefix, 0, HEADER_LENGTH))
         self.postfix_head = HEAD.pack(postfix, 1, FOOTER_LENGTH)
 
 
@@ -123,31 +125,31 @@ def message_overhead(protection: Protection | None, receivers: int) -> int:
 
 def read_key_id(envelope: Envelope, octets: Octets, at: int) -> bytes:
     """The key id in the CryptoHeader of the prefix at ``octets[at]``."""
-    kind, flags, length, _, found, _ = _PREFIX.unpack_from(octets, at)
-    if kind != envelope.prefix or length != (HEADER_LENGTH if flags & 1 else HEADER_LENGTH << 8):
+    head, _, key_id, _ = _PREFIX.unpack_from(octets, at)
+    if head not in envelope.prefix_heads:
         raise MalformedMessage(f"no {envelope.name}_PREFIX", element="envelope", offset=at)
-    return bytes(found)
+    return bytes(key_id)
 
 
 def read_envelope(envelope: Envelope, octets: Octets, at: int) -> Parts:
     """The parts of the envelope that begins at ``octets[at]``; whether it is encrypted its own kind says."""
-    lead = _PREFIX_AND_BODY.unpack_from(octets, at)
-    kind, flags, length, kind_octets, key_id, nonce, body_kind, body_flags, body_length, content_length = lead
-    if kind != envelope.prefix or length != (HEADER_LENGTH if flags & 1 else HEADER_LENGTH << 8):
+    head, kind_octets, key_id, nonce, kind, flags, length, count = _PREFIX_AND_BODY.unpack_from(octets, at)
+    if head not in envelope.prefix_heads:
         raise MalformedMessage(f"no {envelope.name}_PREFIX", element="envelope", offset=at)
     content_at = at + _PREFIX_LENGTH
     if kind_octets in _ENCRYPTED_KINDS:
-        postfix_at = content_at + 4 + (body_length if body_flags & 1 else swapped(body_length))
+        postfix_at = content_at + 4 + (length if flags & 1 else swapped(length))
         content_at += _BODY_LENGTH
-        content_end = content_at + int.from_bytes(content_length, "big")
-        if body_kind != SEC_BODY or not 0 <= postfix_at - content_end <= _LONGEST_PADDING:
+        content_end = content_at + int.from_bytes(count, "big")
+        if kind != SEC_BODY or not 0 <= postfix_at - content_end <= _LONGEST_PADDING:
             raise MalformedMessage("no SEC_BODY with as much as it says", element="envelope", offset=content_at)
     else:
         content_end = postfix_at = _find_postfix(envelope, octets, content_at)
-    kind, flags, length, mac, count = _POSTFIX.unpack_from(octets, postfix_at)
+    head, mac, count = _POSTFIX.unpack_from(octets, postfix_at)
+    macs_length, is_last = _macs_length(envelope.postfix, head, count)
     macs_at = postfix_at + _POSTFIX_LENGTH
-    end = postfix_at + 4 + (length if flags & 1 else swapped(length)) if length else len(octets)
-    if kind != envelope.postfix or end > len(octets) or end - macs_at != int.from_bytes(count, "big") * 20:
+    end = macs_at + macs_length
+    if macs_length < 0 or end > len(octets) or (is_last and end != len(octets)):
         reason = f"no {envelope.name}_POSTFIX with as many MACs as it says"
         raise MalformedMessage(reason, element="envelope", offset=postfix_at)
     return kind_octets, key_id, nonce, content_at, content_end, mac, macs_at, end
@@ -157,6 +159,22 @@ def receiver_key_ids(octets: Octets) -> frozenset[bytes]:
     """Whom the submessage in this envelope bears MACs for."""
     *_, macs_at, end = read_envelope(SUBMESSAGE, octets, 0)
     return frozenset(bytes(octets[at : at + KEY_ID_LENGTH]) for at in range(macs_at, end, RECEIVER_MAC_LENGTH))
+
+
+# Postfixes are much alike: to look one up is quicker than to take it apart.
+@lru_cache(maxsize=256)
+def _macs_length(kind: int, head: bytes, count: bytes) -> tuple[int, bool]:
+    """Octets of the receiver-specific MACs, by the postfix's head and its count; below 0 if these do not agree.
+
+    And whether it is the last submessage of all, as a length of 0 says.
+    """
+    found, flags, length = HEAD.unpack(head)
+    macs_length = int.from_bytes(count, "big") * RECEIVER_MAC_LENGTH
+    if not flags & 1:
+        length = swapped(length)
+    if found != kind or length not in (0, FOOTER_LENGTH + macs_length):
+        return -1, False
+    return macs_length, length == 0
 
 
 def swapped(length: int) -> int:

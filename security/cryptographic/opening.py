@@ -19,13 +19,14 @@ from ddsi.structure.errors import MalformedMessage
 from .aes_gcm import LARGE, decrypt_joined
 from .envelope import HEAD, MAY_BE_EMPTY, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, read_envelope, swapped
 from .received_keys import KeyRing
-from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, Protection
+from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, MAC_LENGTH, Protection
 
 __all__ = ["open_message", "open_submessage"]
 
 _RTPS: Final = b"RTPS"
 _INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
 _ENVELOPE_KINDS: Final = frozenset(range(SubmessageKind.SEC_BODY, SubmessageKind.SRTPS_POSTFIX + 1))
+_ENDS_TOO_SOON: Final = "the octets end within the envelope"
 
 _Plain = bytes | bytearray | memoryview
 
@@ -43,7 +44,7 @@ def open_submessage(octets: Octets, ring: KeyRing, expected: Protection | None) 
     except MalformedMessage as error:
         return Rejected(str(error))
     except struct.error:
-        return Rejected("the octets end within the envelope")
+        return Rejected(_ENDS_TOO_SOON)
 
 
 def open_message(octets: Octets, ring: KeyRing, expected: Protection | None) -> Octets | Outcome:
@@ -57,22 +58,24 @@ def open_message(octets: Octets, ring: KeyRing, expected: Protection | None) -> 
         plain = _open(MESSAGE, octets, HEADER_LENGTH, ring, expected)
         if isinstance(plain, Outcome):
             return plain
-        _check_info_source(plain, octets)
     except MalformedMessage as error:
         return Rejected(str(error))
     except struct.error:
-        return Rejected("the octets end within the envelope")
+        return Rejected(_ENDS_TOO_SOON)
+    if plain[:4] not in _INFO_SRC_HEADS or len(plain) < 24:
+        return Rejected("there is no INFO_SRC at the head of what was protected")
+    if plain[12:24] != octets[8:HEADER_LENGTH]:
+        return Rejected("INFO_SRC names another participant than the header")
     # INFO_SRC is laid out as a message's header, with `unused` where that has "RTPS".
     if isinstance(plain, bytearray):
         plain[4:8] = _RTPS
         return memoryview(plain)[4:]
-    return b"".join((_RTPS, plain[8:]))
+    return _RTPS + plain[8:]
 
 
 def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: Protection | None) -> _Plain | Outcome:
     """What lies in the envelope that begins at ``octets[at]``.  Raises MalformedMessage, struct.error."""
-    is_large = len(octets) >= LARGE
-    octets = memoryview(octets) if is_large else bytes(octets)
+    octets = bytes(octets) if len(octets) < LARGE else memoryview(octets)
     kind_octets, key_id, nonce, content_at, content_end, mac, macs_at, end = read_envelope(envelope, octets, at)
     keys = ring.fitting(kind_octets, key_id, expected)
     if isinstance(keys, Outcome):
@@ -82,20 +85,19 @@ def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: 
     for key in keys:
         session = key.sessions.get(session_id) or key.derive(session_id)
         plain: _Plain = content
-        try:
-            if not key.encrypts:
-                session.aead.decrypt(nonce, mac, content)
-            elif is_large:
+        if not key.encrypts:
+            if not compare_digest(session.aead.encrypt(nonce, b"", content), mac):
+                continue
+        else:
+            try:
                 plain = decrypt_joined(session.aead, nonce, content, mac)
-            else:
-                plain = session.aead.decrypt(nonce, b"".join((content, mac)), None)
-        except InvalidTag:
-            continue
+            except InvalidTag:
+                continue
         if expected is not None and expected.origin_authenticated:
-            found = _find_receiver_mac(octets, macs_at, end, key.receiver_key_id)
-            if session.receiver_aead is None or found is None:
+            receiver_mac = _find_receiver_mac(octets, macs_at, end, key.receiver_key_id)
+            if session.receiver_aead is None or receiver_mac is None:
                 return Rejected("it bears no MAC for us")
-            if not compare_digest(session.receiver_aead.encrypt(nonce, b"", mac), found):
+            if not compare_digest(session.receiver_aead.encrypt(nonce, b"", mac), receiver_mac):
                 return Rejected("the MAC for us is wrong")
         if session_id not in key.sessions:
             key.keep(session_id, session)
@@ -103,13 +105,11 @@ def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: 
     return Rejected("the common MAC is wrong")
 
 
-def _find_receiver_mac(octets: bytes | memoryview, at: int, end: int, key_id: bytes) -> bytes | memoryview | None:
+def _find_receiver_mac(octets: bytes | memoryview, start: int, end: int, key_id: bytes) -> bytes | memoryview | None:
     """The MAC that the sender made for us alone: without it, any fellow receiver might have sent this."""
-    while at < end:
-        mac_at = at + KEY_ID_LENGTH
-        at += RECEIVER_MAC_LENGTH
-        if octets[mac_at - KEY_ID_LENGTH : mac_at] == key_id:
-            return octets[mac_at:at]
+    for at in range(start + KEY_ID_LENGTH, end, RECEIVER_MAC_LENGTH):
+        if octets[at - KEY_ID_LENGTH : at] == key_id:
+            return octets[at : at + MAC_LENGTH]
     return None
 
 
@@ -123,11 +123,3 @@ def _check_submessage(plain: _Plain) -> None:
         raise MalformedMessage(f"{len(plain)} octets are not one submessage", element="envelope")
     if kind in _ENVELOPE_KINDS:
         raise MalformedMessage("an envelope within an envelope", element="envelope")
-
-
-def _check_info_source(plain: _Plain, octets: Octets) -> None:
-    """INFO_SRC is the first, and authenticates what the header, in clear, said."""
-    if plain[:4] not in _INFO_SRC_HEADS or len(plain) < 24:
-        raise MalformedMessage("no INFO_SRC at the head of a protected message", element="INFO_SRC")
-    if plain[12:24] != octets[8:HEADER_LENGTH]:
-        raise MalformedMessage("INFO_SRC names another participant than the header", element="INFO_SRC")

@@ -12,6 +12,7 @@ the DATA submessage could not be told from a signed payload else.
 
 from __future__ import annotations
 
+from hmac import compare_digest
 from typing import Final
 
 from cryptography.exceptions import InvalidTag
@@ -60,8 +61,8 @@ def encode_payload(buffer: bytearray, plain: Octets, key: SendingKey) -> Refused
         buffer += b"".join((header, length.to_bytes(4, "big"), sealed, _NO_MACS))
     else:
         buffer += header + length.to_bytes(4, "big")
-        append_encrypted(buffer, plain, key.aead, nonce)
-        buffer += _NO_MACS
+        tag = append_encrypted(buffer, plain, key.aead, nonce, spare=_FOOTER_LENGTH)
+        buffer += tag + _NO_MACS
     return None
 
 
@@ -103,8 +104,8 @@ def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey) -> bytes 
     plain = octets[HEADER_LENGTH:mac_at]
     if key.encrypts:
         plain = session.aead.decrypt(nonce, octets[_CONTENT_AT:end], None)
-    else:
-        session.aead.decrypt(nonce, octets[mac_at:end], plain)
+    elif not compare_digest(session.aead.encrypt(nonce, b"", plain), octets[mac_at:end]):
+        raise InvalidTag
     if session_id not in key.sessions:
         key.keep(session_id, session)
     return plain

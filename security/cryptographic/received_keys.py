@@ -100,11 +100,13 @@ class KeyRing:
         keys = self.by_id.get(key_id)
         if keys is None:
             return NoKeys(key_id)
-        if keys[0].kind_octets != kind_octets or len(keys) > 1:
+        key = keys[0]
+        if key.kind_octets != kind_octets or len(keys) > 1:
             keys = tuple([key for key in keys if key.kind_octets == kind_octets])
-            if len(keys) == 0:
+            if not keys:
                 return Rejected(f"transformation kind {kind_octets.hex()} is not that of key {key_id.hex()}")
-        if expected is not None and keys[0].encrypts is not expected.encrypted:
+            key = keys[0]
+        if expected is not None and key.encrypts is not expected.encrypted:
             return Rejected(_NOT_ENCRYPTED if expected.encrypted else _NOT_SIGNED)
         return keys
 

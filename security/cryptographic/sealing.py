@@ -32,7 +32,7 @@ def seal_submessage(
     buffer: bytearray, submessage: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
 ) -> Refused | None:
     """Append a submessage, protected.  Its length must be filled in: it is no longer the last of a message."""
-    return _seal(SUBMESSAGE, buffer, b"", submessage, key, receivers)
+    return _seal(SUBMESSAGE, buffer, submessage, key, receivers)
 
 
 def seal_message(
@@ -40,74 +40,51 @@ def seal_message(
 ) -> Refused | None:
     """Append a message: its header, and protected an INFO_SRC that repeats the header, and all its submessages."""
     start = len(buffer)
-    if len(message) < LARGE:
-        message = bytes(message)
     buffer += message[:HEADER_LENGTH]
-    refused = _seal(MESSAGE, buffer, _INFO_SRC_HEAD, memoryview(message)[4:], key, receivers)
+    rest = message[4:] if len(message) < LARGE else memoryview(message)[4:]
+    refused = _seal(MESSAGE, buffer, b"".join((_INFO_SRC_HEAD, rest)), key, receivers)
     if refused is not None:
         del buffer[start:]
     return refused
 
 
 def _seal(
-    envelope: Envelope,
-    buffer: bytearray,
-    lead: bytes,
-    rest: Octets,
-    key: SendingKey,
-    receivers: Sequence[ReceiverKey],
+    envelope: Envelope, buffer: bytearray, plain: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
 ) -> Refused | None:
-    """Append ``lead`` and ``rest``, protected as one."""
-    length = len(lead) + len(rest)
-    if length > LONGEST_BODY - 4 and key.encrypts:
-        return Refused(f"{length} octets do not fit into one SEC_BODY")
-    if length & 3 and not key.encrypts:
+    """Append ``plain``, protected."""
+    length = len(plain)
+    if key.encrypts:
+        if length > LONGEST_BODY - 4:
+            return Refused(f"{length} octets do not fit into one SEC_BODY")
+    elif length & 3:
         return Refused(f"{length} octets are to be signed, which is no multiple of 4")
-    if len(receivers) > _MOST_RECEIVERS:
+    if receivers and len(receivers) > _MOST_RECEIVERS:
         return Refused(f"MACs for {len(receivers)} receivers do not fit into one footer")
     header = key.next_header(length)
     if header is None:
         return USED_UP
     nonce = header[NONCE_AT:]
-    if length >= LARGE:
-        mac = _append_large(envelope, buffer, header, lead, rest, key)
-    elif key.encrypts:
-        sealed = key.aead.encrypt(nonce, lead + rest if lead else rest, None)
-        mac = sealed[-MAC_LENGTH:]
-        padding = _PADDING[length & 3]
-        buffer += b"".join((envelope.prefix_head, header, _body_head(length), sealed[:-MAC_LENGTH], padding))
-    else:
-        plain = lead + rest if lead else rest
-        mac = key.aead.encrypt(nonce, b"", plain)
-        buffer += b"".join((envelope.prefix_head, header, plain))
-    if not receivers:
-        buffer += envelope.postfix_head + mac + _NO_MACS
-        return None
-    buffer += _postfix_head(envelope, len(receivers)) + mac + len(receivers).to_bytes(4, "big")
-    for receiver in receivers:
-        buffer += receiver.key_id + receiver.mac(key, nonce, mac)
-    return None
-
-
-def _append_large(
-    envelope: Envelope, buffer: bytearray, header: bytes, lead: bytes, rest: Octets, key: SendingKey
-) -> bytes:
-    """As :func:`_seal` does it up to the postfix, but copying the octets only once; returns the common MAC."""
-    nonce = header[NONCE_AT:]
-    buffer += envelope.prefix_head + header
     if not key.encrypts:
-        start = len(buffer)
-        buffer += lead
-        buffer += rest
-        with memoryview(buffer) as whole, whole[start:] as plain:
-            return key.aead.encrypt(nonce, b"", plain)
-    length = len(lead) + len(rest)
-    buffer += _body_head(length)
-    append_encrypted(buffer, rest, key.aead, nonce, lead=lead)
-    mac = bytes(buffer[-MAC_LENGTH:])
-    del buffer[-MAC_LENGTH:]
-    buffer += _PADDING[length & 3]
-    return mac
+        mac = key.aead.encrypt(nonce, b"", plain)
+        buffer += envelope.prefix_head + header
+        buffer += plain
+    elif length < LARGE:
+        sealed = key.aead.encrypt(nonce, plain, None)
+        mac = sealed[-MAC_LENGTH:]
+        buffer += b"".join((envelope.prefix_head, header, _body_head(length), sealed[:-MAC_LENGTH]))
+    else:
+        buffer += envelope.prefix_head + header + _body_head(length)
+        spare = FOOTER_LENGTH + RECEIVER_MAC_LENGTH * len(receivers) + 8
+        mac = append_encrypted(buffer, plain, key.aead, nonce, spare=spare)
+    if not receivers:
+        buffer += _PADDING[length & 3] + envelope.postfix_head + mac + _NO_MACS
+        return None
+    head, count = _postfix_head(envelope, len(receivers))
+    parts = [_PADDING[length & 3], head, mac, count]
+    for receiver in receivers:
+        parts += receiver.key_id, receiver.mac(key, nonce, mac)
+    buffer += b"".join(parts)
+    return None
 
 
 # Few lengths are in use at a time, and to look one up is quicker than to pack it.
@@ -118,5 +95,7 @@ def _body_head(length: int) -> bytes:
 
 
 @lru_cache(maxsize=256)
-def _postfix_head(envelope: Envelope, receivers: int) -> bytes:
-    return HEAD.pack(envelope.postfix, 1, FOOTER_LENGTH + RECEIVER_MAC_LENGTH * receivers)
+def _postfix_head(envelope: Envelope, receivers: int) -> tuple[bytes, bytes]:
+    """The head, and the number of receivers as it stands in the footer."""
+    length = FOOTER_LENGTH + RECEIVER_MAC_LENGTH * receivers
+    return HEAD.pack(envelope.postfix, 1, length), receivers.to_bytes(4, "big")
