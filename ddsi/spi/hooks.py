@@ -188,8 +188,8 @@ class SecurityHooks(Protocol):
         ...
 
     def unmatch(self, local: Guid, remote: Guid) -> None:
-        """A pair that was admitted, or pending, is one no more.  Not for each pair of a participant that is lost, of
-        which :meth:`remote_participant_lost` tells."""
+        """A pair of the application's endpoints that was admitted, or pending, is one no more.  Builtin pairs end with
+        :meth:`remote_participant_lost`."""
         ...
 
     # --- messages and the clock --------------------------------------------------------------------------
