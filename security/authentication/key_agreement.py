@@ -122,7 +122,7 @@ def _encoded(key: ec.EllipticCurvePublicKey) -> bytes:
 
 
 def _point(agreement: KeyAgreement, public: bytes) -> ec.EllipticCurvePublicKey:
-    if len(public) != agreement.public_octets or public[:1] != b"\x04":
+    if len(public) != agreement.public_octets:
         raise NotTrusted(f"its public key is no uncompressed point of {agreement.public_octets} octets")
     try:
         return ec.EllipticCurvePublicKey.from_encoded_point(_CURVES[agreement](), public)

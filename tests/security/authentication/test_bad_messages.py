@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ddsi_security.authentication.algorithms import ECDH_P256
 from ddsi_security.authentication.certificate import Certificate
-from ddsi_security.authentication.key_agreement import _G, _P, _Q
+from ddsi_security.authentication.handshake_tokens import AgreedValues, Credentials, reply_token, required
+from ddsi_security.authentication.key_agreement import _G, _P, _Q, EphemeralKey
 from ddsi_security.authentication.not_trusted import NotTrusted
 from ddsi_security.authentication.participant_data import ParticipantData
 from ddsi_security.plugins import HandshakeStep, RemoteIdentity
@@ -88,7 +91,43 @@ def test_every_change_of_a_request_that_its_hash_covers_is_refused() -> None:
     assert all("bit of" in what for what in unnoticed)
 
 
+@pytest.mark.parametrize("name", [b"RSASSA-PSS-SHA256", b"ECDSA+P384+SHA384", b"ECDSA-SHA512", b"", b"\xff"])
+def test_a_signature_algorithm_that_is_not_the_certificate_s_is_refused(name: bytes) -> None:
+    both = pair()
+    properties = tuple(
+        (key, name if key == "c.dsign_algo" else octets)
+        for key, octets in without_hashes(message(both.request())).binary_properties
+    )
+    reason = refusal(both.reply(DataHolder("DDS:Auth:PKI-DH:1.0+Req", (), properties)))
+    assert "its certificate's key is EC P-256" in reason
+
+
+def test_a_replier_cannot_choose_another_key_agreement() -> None:
+    """Not even one who signs what he says."""
+    both = pair()
+    requested = both.request()
+    request = message(requested)
+    theirs = Credentials.of(message(done(both.reply(request))))
+    other = replace(theirs, c_kagree_algo=b"ECDHE-CEUM+P384")
+    values = AgreedValues(
+        hash_c1=required(request, "hash_c1"),
+        challenge1=required(request, "challenge1"),
+        dh1=required(request, "dh1"),
+        hash_c2=other.hash(),
+        challenge2=bytes(32),
+        dh2=ON_CURVE,
+    )
+    for credentials, accepted in ((theirs, True), (other, False)):
+        said = replace(values, hash_c2=credentials.hash())
+        reply = reply_token(credentials, said, both.replier.identity.key.sign(said.reply_content()))
+        step = settle(both.initiator.plugin.process_handshake(reply, requested.handle))
+        assert isinstance(step, HandshakeStep) == accepted
+
+
 # --- public keys that are none --------------------------------------------------------------------------------
+
+
+ON_CURVE = EphemeralKey(ECDH_P256, 5).public
 
 
 def _modp(number: int) -> bytes:
@@ -101,6 +140,8 @@ def _modp(number: int) -> bytes:
         (b"ECDH+prime256v1-CEUM", bytes(65)),
         (b"ECDH+prime256v1-CEUM", b"\x04" + bytes(64)),  # not on the curve
         (b"ECDH+prime256v1-CEUM", b"\x00"),  # infinity
+        (b"ECDH+prime256v1-CEUM", b"\x06" + ON_CURVE[1:]),  # the hybrid form
+        (b"ECDH+prime256v1-CEUM", bytes([2 + ON_CURVE[-1] % 2]) + ON_CURVE[1:33]),  # the compressed form
         (b"ECDH+prime256v1-CEUM", b"\x04" + b"\xff" * 64),  # above the field's size
         (b"ECDH+prime256v1-CEUM", b"\x04" + bytes(96)),  # of another curve
         (b"ECDHE-CEUM+P384", b"\x04" + bytes(96)),
