@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 from tests.fuzz.envelopes import receiver, sealed, sender_material
 from tests.fuzz.hostile_messages import Made, submessage
-from tests.security.captured import vectors as v
 from tests.security.captured.straight import SEC_BODY, SEC_POSTFIX, SEC_PREFIX, SRTPS_POSTFIX, SRTPS_PREFIX
+from tests.security.cryptographic import vectors as v
 
 __all__ = ["ENVELOPE_MAKERS"]
 
@@ -18,8 +18,8 @@ ORIGIN, ENCRYPTED, SIGNED = b"\0", b"\1", b"\2"
 
 def key_materials() -> Iterator[Made]:
     """What one stack parsed without looking whether it was all there."""
-    good = bytes.fromhex(v.KEYMAT_256_WITH_RECEIVER)
-    plain = bytes.fromhex(v.KEYMAT_256)
+    good = v.MATERIAL_256_WITH_RECEIVER
+    plain = v.MATERIAL_256
     yield "nothing", b"", MALFORMED
     yield "one-octet-short", good[:-1], MALFORMED
     yield "one-octet-long", good + b"\0", MALFORMED
@@ -43,11 +43,11 @@ def key_materials() -> Iterator[Made]:
 
 
 def crypto_tokens() -> Iterator[Made]:
-    keymat = bytes.fromhex(v.KEYMAT_256_WITH_RECEIVER)
+    keymat = v.MATERIAL_256_WITH_RECEIVER
     for what, number in (("participant", 0), ("writer", 4), ("reader", 8)):
         yield f"{what}-without-key", ORIGIN + bytes([number | 1]) + bytes(24), "Refused"
         yield f"{what}-with-3-tokens", ORIGIN + bytes([number | 3]) + keymat, "Refused"
-        yield f"{what}-without-receiver-key", ORIGIN + bytes([number | 1]) + bytes.fromhex(v.KEYMAT_256), "Refused"
+        yield f"{what}-without-receiver-key", ORIGIN + bytes([number | 1]) + v.MATERIAL_256, "Refused"
         yield (
             f"{what}-that-signs-where-it-should-encrypt",
             ENCRYPTED + bytes([number | 1, 0, 0, 0, 3]) + keymat[4:],

@@ -13,7 +13,6 @@ from ddsi_security.cryptographic import AesGcmGmac
 from ddsi_security.handles import IdentityHandle, ParticipantCryptoHandle, PermissionsHandle, SharedSecretHandle
 from ddsi_security.properties import BUILTIN_ENDPOINT_NAME, KEY_SIZE
 from ddsi_security.tokens import CryptoToken
-from tests.security.captured import vectors as v
 from tests.security.captured.role import NOW, endpoint_attributes, participant_attributes
 from tests.security.captured.straight import (
     SEC_BODY,
@@ -32,13 +31,14 @@ from tests.security.captured.straight import (
     read_material,
     submessages,
 )
+from tests.security.cryptographic import vectors as v
 
 KINDS = ["SIGN", "ENCRYPT", "SIGN_WITH_ORIGIN_AUTHENTICATION", "ENCRYPT_WITH_ORIGIN_AUTHENTICATION"]
 BITS = ["128", "256"]
 WRITER_ID, READER_ID = EntityId(b"\0\0\1\2"), EntityId(b"\0\0\1\7")
-HEARTBEAT = bytes.fromhex(v.HEARTBEAT)
+HEARTBEAT = v.HEARTBEAT
 ACKNACK = bytes.fromhex("060118000000010700000102000000000100000000000000" + "01000000")
-SECRET = SharedSecretHandle(v.CHALLENGE_1, v.CHALLENGE_2, bytes(range(32)), is_replier=False)
+SECRET = SharedSecretHandle(v.CHALLENGE1, v.CHALLENGE2, bytes(range(32)), is_replier=False)
 
 
 class Sender:
@@ -99,12 +99,12 @@ def test_messages(kind: str, bits: str) -> None:
     tokens = [sender.plugin.create_local_participant_crypto_tokens(sender.local, remote) for remote in sender.remotes]
     materials = [material_of(token) for (token,) in tokens]
     assert {key_length(material.kind) * 8 for material in materials} == {int(bits)}
-    message = bytes.fromhex(v.MESSAGE_HEADER) + HEARTBEAT * 3
+    message = v.MESSAGE_HEADER + HEARTBEAT * 3
     encoded = bytearray()
     assert sender.plugin.encode_rtps_message(encoded, message, sender.local, sender.remotes) is None
     assert encoded[:20] == message[:20]
     plain = opened(bytes(encoded[20:]), materials, (SRTPS_PREFIX, SRTPS_POSTFIX), kind)
-    assert plain == bytes.fromhex(v.INFO_SRC) + message[20:]
+    assert plain == v.INFO_SOURCE + message[20:]
 
 
 @pytest.mark.parametrize("bits", BITS)
@@ -157,7 +157,7 @@ def test_the_volatile_topic() -> None:
     reader = plugin.register_local_datareader(sender.local, {BUILTIN_ENDPOINT_NAME: f"{name}Reader"}, nothing)
     remote_reader = plugin.register_matched_remote_datareader(writer, remote, SECRET, relay_only=False)
     remote_writer = plugin.register_matched_remote_datawriter(reader, remote, SECRET)
-    material = kx_material(v.CHALLENGE_1, v.CHALLENGE_2, bytes(range(32)))
+    material = kx_material(v.CHALLENGE1, v.CHALLENGE2, bytes(range(32)))
     nonces = set()
     for _ in range(20):
         encoded = bytearray()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from tests.security.captured import vectors as v
 from tests.security.captured.straight import (
     AES128_GCM,
     AES256_GCM,
@@ -22,11 +21,12 @@ from tests.security.captured.straight import (
     session_receiver_key,
     submessages,
 )
+from tests.security.cryptographic import vectors as v
 
-LONG = Material(AES256_GCM, v.SALT, v.KEY_ID, v.KEY, v.RECEIVER_KEY_ID, v.RECEIVER_KEY)
-SHORT = Material(AES128_GCM, v.SALT[:16], v.KEY_ID, v.KEY[:16], v.RECEIVER_KEY_ID, v.RECEIVER_KEY[:16])
-SIGNING = Material(AES256_GMAC, v.SALT, v.KEY_ID, v.KEY, v.RECEIVER_KEY_ID, v.RECEIVER_KEY)
-KX = Material(AES256_GCM, bytes.fromhex(v.KX_SALT), bytes(4), bytes.fromhex(v.KX_KEY))
+LONG = Material(AES256_GCM, v.SALT, v.SENDER_KEY_ID, v.SENDER_KEY, v.RECEIVER_KEY_ID, v.RECEIVER_KEY)
+SHORT = Material(AES128_GCM, v.SALT[:16], v.SENDER_KEY_ID, v.SENDER_KEY[:16], v.RECEIVER_KEY_ID, v.RECEIVER_KEY[:16])
+SIGNING = Material(AES256_GMAC, v.SALT, v.SENDER_KEY_ID, v.SENDER_KEY, v.RECEIVER_KEY_ID, v.RECEIVER_KEY)
+KX = Material(AES256_GCM, v.EXCHANGE_SALT, bytes(4), v.EXCHANGE_KEY)
 
 PAYLOADS = [
     (v.PAYLOAD_ENCRYPTED_256, LONG),
@@ -34,12 +34,12 @@ PAYLOADS = [
     (v.PAYLOAD_ENCRYPTED_128, SHORT),
 ]
 ENVELOPES = [
-    (v.SUBMESSAGE_ENCRYPTED_WITH_RECEIVER, LONG, v.HEARTBEAT),
-    (v.SUBMESSAGE_SIGNED_WITH_RECEIVER, SIGNING, v.HEARTBEAT),
-    (v.SUBMESSAGE_ENCRYPTED, LONG, v.HEARTBEAT),
-    (v.MESSAGE_ENCRYPTED_WITH_RECEIVER[40:], LONG, v.INFO_SRC + v.HEARTBEAT),
-    (v.MESSAGE_SIGNED[40:], SIGNING, v.INFO_SRC + v.HEARTBEAT),
-    (v.VOLATILE_ENCRYPTED, KX, v.VOLATILE_HEARTBEAT),
+    (v.HEARTBEAT_ENCRYPTED_FOR_ONE, LONG, v.HEARTBEAT),
+    (v.HEARTBEAT_SIGNED_FOR_ONE, SIGNING, v.HEARTBEAT),
+    (v.HEARTBEAT_ENCRYPTED, LONG, v.HEARTBEAT),
+    (v.MESSAGE_ENCRYPTED_FOR_ONE[20:], LONG, v.INFO_SOURCE + v.HEARTBEAT),
+    (v.MESSAGE_SIGNED[20:], SIGNING, v.INFO_SOURCE + v.HEARTBEAT),
+    (v.VOLATILE_HEARTBEAT_ENCRYPTED, KX, v.VOLATILE_HEARTBEAT),
 ]
 
 
@@ -56,23 +56,22 @@ def open_envelope(octets: bytes, material: Material) -> bytes:
 
 
 def test_session_keys_are_the_first_octets_of_a_hash() -> None:
-    assert session_key(LONG, v.SESSION_ID).hex() == v.SESSION_KEY_256
-    assert session_key(SHORT, v.SESSION_ID).hex() == v.SESSION_KEY_128
-    assert session_receiver_key(LONG, v.SESSION_ID).hex() == v.RECEIVER_SESSION_KEY_256
-    assert session_receiver_key(SHORT, v.SESSION_ID).hex() == v.RECEIVER_SESSION_KEY_128
-    assert session_key(KX, v.SESSION_ID).hex() == v.KX_SESSION_KEY
+    assert session_key(LONG, v.SESSION_ID) == v.SESSION_KEY_256
+    assert session_key(SHORT, v.SESSION_ID) == v.SESSION_KEY_128
+    assert session_receiver_key(LONG, v.SESSION_ID) == v.RECEIVER_SESSION_KEY_256
+    assert session_receiver_key(SHORT, v.SESSION_ID) == v.RECEIVER_SESSION_KEY_128
+    assert session_key(KX, v.SESSION_ID) == v.EXCHANGE_SESSION_KEY
 
 
 def test_key_material_of_each_size() -> None:
-    assert read_material(bytes.fromhex(v.KEYMAT_256_WITH_RECEIVER)) == LONG
-    assert read_material(bytes.fromhex(v.KEYMAT_256)) == Material(AES256_GCM, v.SALT, v.KEY_ID, v.KEY)
-    assert read_material(bytes.fromhex(v.KEYMAT_128)) == Material(AES128_GCM, v.SALT[:16], v.KEY_ID, v.KEY[:16])
+    assert read_material(v.MATERIAL_256_WITH_RECEIVER) == LONG
+    assert read_material(v.MATERIAL_256) == Material(AES256_GCM, v.SALT, v.SENDER_KEY_ID, v.SENDER_KEY)
+    assert read_material(v.MATERIAL_128) == Material(AES128_GCM, v.SALT[:16], v.SENDER_KEY_ID, v.SENDER_KEY[:16])
 
 
-@pytest.mark.parametrize(("encoded", "material"), PAYLOADS)
-def test_payloads(encoded: str, material: Material) -> None:
-    octets = bytes.fromhex(encoded)
-    assert open_payload(octets, material).hex() == v.PAYLOAD
+@pytest.mark.parametrize(("octets", "material"), PAYLOADS)
+def test_payloads(octets: bytes, material: Material) -> None:
+    assert open_payload(octets, material) == v.PAYLOAD
     # The kind, key id and the lengths are compared or used; a change of these is no matter of the MAC.
     for position in [*range(8, 20), *range(24, len(octets) - 4)]:
         changed = bytearray(octets)
@@ -81,10 +80,9 @@ def test_payloads(encoded: str, material: Material) -> None:
             open_payload(bytes(changed), material)
 
 
-@pytest.mark.parametrize(("encoded", "material", "plain"), ENVELOPES)
-def test_envelopes(encoded: str, material: Material, plain: str) -> None:
-    octets = bytes.fromhex(encoded)
-    assert open_envelope(octets, material).hex() == plain
+@pytest.mark.parametrize(("octets", "material", "plain"), ENVELOPES)
+def test_envelopes(octets: bytes, material: Material, plain: bytes) -> None:
+    assert open_envelope(octets, material) == plain
     prefix, *_, postfix = submessages(octets)
     mac = len(octets) - len(postfix.body)
     count = int.from_bytes(postfix.body[16:20], "big")
