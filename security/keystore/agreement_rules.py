@@ -22,9 +22,10 @@ from .finding import Finding, Rule, Severity
 __all__ = ["RULES", "check_documents", "check_subject", "subject_of"]
 
 SUBJECT_MISMATCH: Final = Rule("subject-mismatch", Severity.ERROR, "no grant is for the subject of the certificate")
+SUBJECT_SPELLING: Final = Rule("subject-spelling", Severity.WARNING, "a grant names its subject otherwise than openssl")
 DOMAIN_WITHOUT_RULE: Final = Rule("domain-without-rule", Severity.ERROR, "rights in a domain that governance lacks")
 TOPIC_WITHOUT_RULE: Final = Rule("topic-without-rule", Severity.ERROR, "rights to a topic that governance lacks")
-RULES: Final = (SUBJECT_MISMATCH, DOMAIN_WITHOUT_RULE, TOPIC_WITHOUT_RULE)
+RULES: Final = (SUBJECT_MISMATCH, SUBJECT_SPELLING, DOMAIN_WITHOUT_RULE, TOPIC_WITHOUT_RULE)
 
 _MOST_TOPICS: Final = 1000
 """Topics of a rule, and topic rules, that are compared with each other."""
@@ -42,7 +43,17 @@ def check_subject(identity: Certified, permissions: LoadedDocument) -> Iterator[
     """Is there a grant for the bearer of the certificate?"""
     assert isinstance(permissions.model, Permissions)
     subject = subject_of(identity)
-    if subject is None or any(grant.is_for(subject) for grant in permissions.model.grants):
+    if subject is None:
+        return
+    own = next((grant for grant in permissions.model.grants if grant.is_for(subject)), None)
+    if own:
+        if own.subject and own.subject.text != subject.text:
+            yield SUBJECT_SPELLING.at(
+                permissions.path,
+                f"the grant is for {own.subject}, the certificate for {subject}: the same, but Fast DDS does not see it",
+                line=own.line,
+                remedy=f"write <subject_name>{subject}</subject_name>, as openssl x509 -nameopt RFC2253 prints it",
+            )
         return
     grants = {str(grant.subject or grant.subject_expression): grant for grant in reversed(permissions.model.grants)}
     nearest = (difflib.get_close_matches(str(subject), grants, n=1, cutoff=0) or list(grants))[0]

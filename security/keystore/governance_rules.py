@@ -76,7 +76,7 @@ def check_domains(document: LoadedDocument, node: Node) -> Iterator[Finding]:
         if child.tag == "id_range" and highest is None:
             yield RANGE_WITHOUT_MAX.at(
                 document.path,
-                "the id_range has no max: Fast DDS takes it for the one domain in min, others for all from there on",
+                "the id_range has no max: Cyclone DDS refuses the document, and Fast DDS takes it for one domain",
                 line=child.line,
                 remedy=f"write both ends, such as <max>{CYCLONE_HIGHEST_DOMAIN}</max>",
             )

@@ -115,7 +115,7 @@ def _check_vendors(document: LoadedDocument, grant: Grant, node: Node) -> Iterat
             yield DENY_RULE.at(
                 document.path,
                 "a deny_rule without partitions denies all of them, with Cyclone DDS only the empty one; with some, "
-                "Fast DDS denies the topic in all others too",
+                "Fast DDS denies the topic in all others too; and Cyclone DDS refuses the topic as such",
                 line=child.line,
                 remedy="name what is allowed instead, and leave the rest to <default>DENY</default>",
             )

@@ -197,12 +197,14 @@ def _(workshop: Workshop) -> None:
     workshop.permissions_ca = workshop.document_signer = workshop.identity_ca
 
 
-for subject in (r"CN=alice,O=Example\, Inc.", "CN=alice,OU=a,OU=b"):
+@spoils("subject-repeats", "cert.pem")
+def _(workshop: Workshop) -> None:
+    workshop.identity = workshop.make_identity("CN=alice,OU=a,OU=b")
+    workshop.replace("permissions", (ALICE, "CN=alice,OU=a,OU=b"))
 
-    @spoils("subject-characters", "cert.pem")
-    def _(workshop: Workshop, subject: str = subject) -> None:
-        workshop.identity = workshop.make_identity(subject)
-        workshop.replace("permissions", (ALICE, subject))
+
+for spelling in ("O=Example,CN=alice", "CN = alice, O = Example", "/O=Example/CN=alice"):
+    permissions("subject-spelling", "<grant", (ALICE, spelling))
 
 
 for name in ("governance", "permissions"):

@@ -103,8 +103,9 @@ def a_certificate_for_thirty_days(workshop: Workshop) -> None:
 
 
 @near_miss
-def the_subject_in_another_order(workshop: Workshop) -> None:
-    workshop.replace("permissions", (ALICE, "O=Example,CN=alice"))
+def a_subject_with_a_comma(workshop: Workshop) -> None:
+    workshop.identity = workshop.make_identity("/O=Example, Inc./CN=alice")
+    workshop.replace("permissions", (ALICE, r"CN=alice,O=Example\, Inc."))
 
 
 @near_miss
