@@ -113,6 +113,7 @@ class DiscoveryAgent:
         payload = encode_key(guid, ParameterId.PARTICIPANT_GUID)
         if self._engine.builtin.writer(ids.SPDP_SECURE_WRITER) is not None:
             self._engine.write_builtin(ids.SPDP_SECURE_WRITER, kind, payload, guid, now)
+            self._engine.flush()  # so that those who believe only this one hear it first
         change = self._spdp_writer.new_change(kind, payload, self._engine.wall_ticks(), key_hash=guid)
         known = [locator for proxy in self._engine.participants.values() for locator in proxy.metatraffic]
         destinations = tuple(dict.fromkeys([*self._announcer.destinations, *known]))

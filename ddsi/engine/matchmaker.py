@@ -103,7 +103,8 @@ class Matchmaker:
         writer = self._engine.local_writers.get(local)
         reader_data = self._engine.known_readers.get(remote)
         if writer is not None and reader_data is not None:
-            if self._admits(local, remote, reader_data.topic_name, admission):
+            is_closing = writer.guid in self._engine.closing
+            if self._admits(local, remote, reader_data.topic_name, admission) and not is_closing:
                 self._match_reader(writer, reader_data, now)
             return
         reader = self._engine.local_readers.get(local)

@@ -244,6 +244,7 @@ def test_a_goodbye_is_believed_on_the_secure_topic_alone() -> None:
     a.close()
     domain.run(0.1)
     assert b.engine.participants == {}
+    assert b.engine.drops[DropReason.CLEAR_TEXT] == 1, "ours was heard on the secure topic first"
     assert [event.reason for event in sink if isinstance(event, ParticipantLost)] == [LossReason.GOODBYE]
 
 
