@@ -107,7 +107,7 @@ def _of_payloads(messages: Sequence[Message], governance: GovernanceDraft) -> It
         sub.payload
         for message in messages
         for sub in message.submessages
-        if sub.kind in (DATA, DATA_FRAG) and _is_users(sub)
+        if sub.kind in (DATA, DATA_FRAG) and _is_users(sub) and sub.payload
     ]
     if not payloads:
         yield "no payload of a user's writer is seen"

@@ -178,7 +178,7 @@ def _meeting_cases() -> Iterator[Case]:
         options=replace(SHAPES, topic="SecretBlob", keyless=True, blob_octets=40 * KIBIBYTE, wait_s=40),
     )  # fmt: skip
     yield _case(
-        "best-effort", "best-effort samples arrive, once and in order", deliver_some, "encrypt-all",
+        "best-effort-encrypt-all", "best-effort samples arrive, once and in order", deliver_some, "encrypt-all",
         options=replace(SHAPES, best_effort=True, volatile=True, count=20), gate=True, quick=(_DIRECTIONS[3],),
     )  # fmt: skip
     for number, governance in enumerate(("data", "metadata-origin", "all-origin")):

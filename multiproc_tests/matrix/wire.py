@@ -21,7 +21,7 @@ DATA, DATA_FRAG = 0x15, 0x16
 _WRITER_ID_AT = {0x06: 4, 0x07: 4, 0x08: 4, 0x12: 4, 0x13: 4, DATA: 8, DATA_FRAG: 8}
 """Where an ACKNACK, HEARTBEAT, GAP, NACK_FRAG, HEARTBEAT_FRAG, DATA or DATA_FRAG names its writer."""
 
-_LITTLE_ENDIAN, _INLINE_QOS = 0x01, 0x02
+_LITTLE_ENDIAN, _INLINE_QOS, _DATA, _KEY = 0x01, 0x02, 0x04, 0x08
 _SENTINEL = 1
 _OCTETS_OF_MAC, _OCTETS_OF_RECEIVER_MAC = 16, 20
 
@@ -64,7 +64,12 @@ class Submessage:
 
     @property
     def payload(self) -> bytes:
-        """Of a DATA or DATA_FRAG: what stands behind the inline QoS, or behind the fixed part if there is none."""
+        """Of a DATA or DATA_FRAG: what stands behind the inline QoS, or behind the fixed part if there is none.
+
+        Nothing of a DATA that has neither data nor a key, by which Fast DDS disposes.
+        """
+        if self.kind == DATA and not self.flags & (_DATA | _KEY):
+            return b""
         order = "<" if self.flags & _LITTLE_ENDIAN else ">"
         (to_inline_qos,) = struct.unpack_from(order + "H", self.body, 2)
         at = 4 + to_inline_qos

@@ -163,6 +163,8 @@ static dds_qos_t *participant_qos(void)
     set_file(qos, "dds.sec.access.permissions_ca", "permissions_ca", ".pem");
     set_file(qos, "dds.sec.access.governance", o.governance, "");
     set_file(qos, "dds.sec.access.permissions", o.name, ".permissions.p7s");
+    if (has_revocation_list(&o))
+      set_file(qos, "org.eclipse.cyclonedds.sec.auth.crl", REVOCATION_LIST, "");
   }
   return qos;
 }

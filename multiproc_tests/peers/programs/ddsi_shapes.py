@@ -16,6 +16,8 @@ from ddsi import idl
 
 from .protocol import Arguments, blob_octets, describe, open_fields, parse_arguments, say
 
+REVOCATION_LIST = "identity_ca.crl.pem"
+
 
 @idl.struct(extensibility=idl.FINAL)
 class ShapeType:
@@ -89,6 +91,8 @@ def participant_qos(o: Arguments) -> ddsi.Qos:
         "dds.sec.access.governance": o.governance,
         "dds.sec.access.permissions": f"{o.name}.permissions.p7s",
     }
+    if os.path.exists(f"{o.store}/{REVOCATION_LIST}"):
+        files["dds.sec.auth.crl"] = REVOCATION_LIST
     return ddsi.Qos(properties={name: f"file:{o.store}/{file}" for name, file in files.items()})
 
 
@@ -122,8 +126,7 @@ async def wait_for_line() -> None:
         octet = os.read(sys.stdin.fileno(), 1)
 
 
-async def publish(o: Arguments, participant: ddsi.DomainParticipant, topic: Any) -> int:
-    writer: Any = ddsi.DataWriter(ddsi.Publisher(participant, group_qos(o)), topic, endpoint_qos(o))
+async def publish(o: Arguments, writer: Any) -> int:
     if o.readers:
         try:
             await writer.wait_for_matched(o.readers, timeout=o.wait_s)
@@ -194,8 +197,7 @@ class Taker:
                 say("MATCHED", event.current_count)
 
 
-async def subscribe(o: Arguments, participant: ddsi.DomainParticipant, topic: Any) -> int:
-    reader: Any = ddsi.DataReader(ddsi.Subscriber(participant, group_qos(o)), topic, endpoint_qos(o))
+async def subscribe(o: Arguments, reader: Any) -> int:
     taker = Taker(o, reader)
     async with trio.open_nursery() as nursery:
         nursery.start_soon(taker.take_all)
@@ -216,13 +218,38 @@ async def subscribe(o: Arguments, participant: ddsi.DomainParticipant, topic: An
     return 0
 
 
+async def watch_refusals(entity: Any) -> None:
+    """Says whom security refuses, and why."""
+    async for event in entity.events():
+        if isinstance(event, ddsi.SecurityRefused):
+            say("REFUSED", event.reason)
+
+
 async def main() -> int:
     o = parse_arguments()
     try:
         async with ddsi.DomainParticipant(o.domain, qos=participant_qos(o)) as participant:
             say("GUID", participant.guid.hex())
-            topic: Any = ddsi.Topic(participant, o.topic, kind_of(o))
-            return await (publish if o.is_publisher else subscribe)(o, participant, topic)
+            async with trio.open_nursery() as nursery:
+                nursery.start_soon(watch_refusals, participant)
+                status = await play(o, participant, nursery)
+                nursery.cancel_scope.cancel()
+            return status
+    except ddsi.DdsError as error:
+        say("ERROR", " ".join(str(error).split()))
+        return 2
+
+
+async def play(o: Arguments, participant: ddsi.DomainParticipant, nursery: trio.Nursery) -> int:
+    topic: Any = ddsi.Topic(participant, o.topic, kind_of(o))
+    try:
+        entity: Any
+        if o.is_publisher:
+            entity = ddsi.DataWriter(ddsi.Publisher(participant, group_qos(o)), topic, endpoint_qos(o))
+        else:
+            entity = ddsi.DataReader(ddsi.Subscriber(participant, group_qos(o)), topic, endpoint_qos(o))
+        nursery.start_soon(watch_refusals, entity)
+        return await (publish if o.is_publisher else subscribe)(o, entity)
     except ddsi.DdsError as error:
         say("ERROR", " ".join(str(error).split()))
         return 2

@@ -120,6 +120,10 @@ static void set_security(DomainParticipantQos& qos)
     properties.emplace_back(access + "permissions_ca", folder + "permissions_ca.pem");
     properties.emplace_back(access + "governance", folder + o.governance);
     properties.emplace_back(access + "permissions", folder + name + ".permissions.p7s");
+    if (has_revocation_list(&o))
+    {
+        properties.emplace_back(auth + "identity_crl", folder + REVOCATION_LIST);
+    }
 }
 
 // One UDP transport on one address: no shared memory, no other interface.

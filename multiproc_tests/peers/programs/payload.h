@@ -80,6 +80,16 @@ static int is_released(void)
   return poll(&input, 1, 0) > 0;
 }
 
+#define REVOCATION_LIST "identity_ca.crl.pem"
+
+/* The keystore may hold a list of certificates that are taken back.  */
+static inline int has_revocation_list(const struct options *o)
+{
+  char path[1024];
+  snprintf(path, sizeof path, "%s/" REVOCATION_LIST, o->store);
+  return access(path, R_OK) == 0;
+}
+
 /* With -G: does not begin to write before it is told to.  */
 static void wait_at_gate(const struct options *o)
 {
