@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import time
 import tracemalloc
 from pathlib import Path
@@ -16,6 +18,10 @@ DOCUMENTATION = Path(__file__).parents[2] / "docs" / "fuzzing.md"
 MOST_SECONDS = 1.0
 MOST_OCTETS = 16 << 20
 """Of memory that Python allocates at once, whatever numbers are in the input."""
+
+
+MOST_OCTETS_OF_A_PROCESS = 1 << 30
+"""Address space, most of which is libraries."""
 
 
 @pytest.mark.parametrize("entry", list(kept()), ids=str)
@@ -34,6 +40,24 @@ def test_it_is_answered_as_it_ought_to_be(entry: KeptInput) -> None:
     finally:
         tracemalloc.stop()
     assert peak < MOST_OCTETS
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="memory is limited by the resource module")
+def test_all_of_it_fits_in_little_memory() -> None:
+    """In a process of its own, as what lies under Python - OpenSSL, libxml2 - allocates without its knowledge."""
+    command = [sys.executable, "-c", RUN_ALL.format(octets=MOST_OCTETS_OF_A_PROCESS)]
+    subprocess.run(command, cwd=FOLDER.parents[2], check=True, timeout=120)
+
+
+RUN_ALL = """
+import resource
+from tests.fuzz.corpus import kept
+from tests.fuzz.targets import TARGETS
+resource.setrlimit(resource.RLIMIT_AS, ({octets}, {octets}))
+for entry in kept():
+    assert entry.is_answered_by(TARGETS[entry.target].run(entry.octets)), entry
+"""
 
 
 def test_each_target_has_inputs_and_each_input_an_expectation() -> None:
