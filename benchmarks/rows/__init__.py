@@ -2,7 +2,17 @@
 
 from benchmarks.benchmark import Benchmark
 
-from . import codec, floors, footprint, matching, round_trip, security_handshake, security_permissions, throughput
+from . import (
+    codec,
+    floors,
+    footprint,
+    matching,
+    round_trip,
+    security_handshake,
+    security_permissions,
+    security_transform,
+    throughput,
+)
 
 __all__ = ["BENCHMARKS"]
 
@@ -14,5 +24,6 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     *footprint.BENCHMARKS,
     *security_handshake.BENCHMARKS,
     *security_permissions.BENCHMARKS,
+    *security_transform.BENCHMARKS,
     *floors.BENCHMARKS,
 )
