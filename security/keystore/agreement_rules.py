@@ -50,7 +50,7 @@ def check_subject(identity: Certified, permissions: LoadedDocument) -> Iterator[
         if own.subject and own.subject.text != subject.text:
             yield SUBJECT_SPELLING.at(
                 permissions.path,
-                f"the grant is for {own.subject}, the certificate for {subject}: the same, but Fast DDS does not see it",
+                f"the grant is for {own.subject}, the certificate for {subject}: the same, but not to Fast DDS",
                 line=own.line,
                 remedy=f"write <subject_name>{subject}</subject_name>, as openssl x509 -nameopt RFC2253 prints it",
             )

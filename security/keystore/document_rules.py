@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -44,31 +44,32 @@ class LoadedDocument:
 
 
 def check_document(
-    path: Path, kind: DocumentKind, signer: Certified | None, others: list[Certified], add: Callable[[Finding], None]
-) -> LoadedDocument | None:
-    """The document, if it can be read at all.  ``others``: authorities that may have signed it by mistake."""
+    path: Path, kind: DocumentKind, signer: Certified | None, others: list[Certified]
+) -> tuple[LoadedDocument | None, list[Finding]]:
+    """The document, if it can be read at all.  ``others``: authorities that may have signed it by mistake.
+
+    Raises ConfigurationError if the file cannot be read.
+    """
     octets = read_file(path)
     signed = unverified(octets)
+    findings: list[Finding] = []
     if signer and is_signed(octets):
         try:
             signed = verify(octets, signer[1], name=str(path))
         except UntrustedDocument as error:
-            add(_untrusted(path, kind, octets, error, signer, others))
+            findings.append(_untrusted(path, kind, octets, error, signer, others))
     elif not is_signed(octets):
-        add(UNSIGNED.at(path, "nobody signed it, so participants refuse it", remedy=_sign_it(path, kind)))
+        remedy = f"rename it to {path.with_suffix('.xml').name}, and then {_sign_it(path, kind)}"
+        findings.append(UNSIGNED.at(path, "nobody signed it, so participants refuse it", remedy=remedy))
     if signed is None:
-        return None
-    for finding in (*_check_text_header(path, kind, octets), *_check_source(path, kind, signed)):
-        add(finding)
+        return None, findings
+    findings += [*_check_text_header(path, kind, octets), *_check_source(path, kind, signed)]
     try:
-        return LoadedDocument(
-            path,
-            parse_document(kind, signed.xml, str(path), signed.first_line),
-            parse_nodes(signed.xml, name=str(path), first_line=signed.first_line),
-        )
+        model = parse_document(kind, signed.xml, str(path), signed.first_line)
+        root = parse_nodes(signed.xml, name=str(path), first_line=signed.first_line)
     except DocumentError as error:
-        add(_invalid(path, error))
-        return None
+        return None, [*findings, _invalid(path, error)]
+    return LoadedDocument(path, model, root), findings
 
 
 def _untrusted(
@@ -104,7 +105,7 @@ def _invalid(path: Path, error: DocumentError) -> Finding:
 
 def _check_text_header(path: Path, kind: DocumentKind, octets: bytes) -> Iterator[Finding]:
     """Cyclone DDS and Fast DDS verify with PKCS7_TEXT, which fails without."""
-    if is_signed(octets) and octets.startswith(b"MIME-Version") and b"multipart/signed" in octets[:1000].lower():
+    if is_signed(octets) and b"multipart/signed" in octets[:1000].lower():
         before_xml = octets[: octets.find(b"<")].lower()
         if _TEXT_HEADER not in before_xml:
             yield NO_TEXT_HEADER.at(

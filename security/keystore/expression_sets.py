@@ -13,22 +13,17 @@ from typing import Final
 from ..access_control.domains import DomainRange, Domains
 from ..access_control.wildcard import matches
 
-__all__ = ["covers", "domains_cover", "domains_overlap", "is_literal", "overlaps"]
+__all__ = ["covers", "domains_cover", "domains_overlap", "overlaps"]
 
 _STAR, _ANY = "*", "?"
 _TOKEN: Final = re.compile(r"\[!?\]?[^\]]*\]|.", re.DOTALL)
-
-
-def is_literal(expression: str) -> bool:
-    """Does it mean the topic of just this name?"""
-    return not any(character in expression for character in "*?[")
 
 
 def covers(wide: str, narrow: str) -> bool:
     """Is every name that ``narrow`` matches one that ``wide`` matches?  False where it is hard to tell."""
     if wide in (narrow, _STAR):
         return True
-    if is_literal(narrow):
+    if not any(wildcard in narrow for wildcard in "*?["):
         return matches(wide, narrow)
     if "[" in wide:
         return False

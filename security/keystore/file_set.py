@@ -98,9 +98,8 @@ def _refuse_to_overwrite(present: Sequence[Path]) -> None:
 def _write(path: Path, octets: bytes, mode: int) -> None:
     """A new file in the place of whatever is there; a symbolic link is replaced, not followed."""
     temporary = path.with_name(f".{path.name}.new")
-    temporary.unlink(missing_ok=True)  # of somebody who was interrupted; O_EXCL sees to it that nobody lent us theirs
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with open(descriptor, "wb") as file:
+    temporary.unlink(missing_ok=True)  # of somebody who was interrupted; "x" sees to it that nobody lent us theirs
+    with open(temporary, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
         file.write(octets)
     os.replace(temporary, path)
 

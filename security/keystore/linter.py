@@ -148,13 +148,11 @@ class _Linter:
             return None
         self._add(check_writable(path))
         authorities = [other for other in others if other and (not signer or other[1] != signer[1])]
-        found: list[Finding] = []
-        document = None
         try:
-            document = check_document(path, kind, signer, authorities, found.append)
+            document, findings = check_document(path, kind, signer, authorities)
         except ConfigurationError as error:
-            found.append(DOCUMENT_INVALID.at(path, str(error), remedy="see to it that it is a readable document"))
-        self._add(found)
+            document, findings = None, [DOCUMENT_INVALID.at(path, str(error), remedy="put a readable document there")]
+        self._add(findings)
         return document
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ddsi_security.access_control.domains import DomainRange, Domains
 from ddsi_security.access_control.wildcard import matches
-from ddsi_security.keystore.expression_sets import covers, domains_cover, domains_overlap, is_literal, overlaps
+from ddsi_security.keystore.expression_sets import covers, domains_cover, domains_overlap, overlaps
 
 EXPRESSIONS = st.text(alphabet="ab*?", max_size=5) | st.sampled_from(["[ab]", "[!a]b", "a[b", "*[a]"])
 NAMES = ["".join(letters) for length in range(5) for letters in product("abc", repeat=length)]
@@ -68,11 +68,6 @@ def test_long_expressions_take_no_time() -> None:
     """The square of the length at most."""
     assert not covers("*a" * 500 + "b", "*a" * 500)
     assert overlaps("*a" * 500, "*b" * 500 + "*")
-
-
-def test_a_literal_means_one_name() -> None:
-    assert is_literal("rt/chatter")
-    assert not any(is_literal(text) for text in ("*", "a?", "[a]"))
 
 
 RANGES = st.builds(
