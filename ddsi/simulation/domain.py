@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 
 from ..config import Config
 from ..discovery.matching import judge
-from ..spi import PLAINTEXT, SecurityHooks
+from ..spi import SecurityHooks
+from ..structure.qos_policies import Properties
 from ..trace.sink import TraceSink
 from .dice import Dice
 from .endpoints import NodeReader, NodeWriter
@@ -56,7 +57,8 @@ class Domain:
         peers: tuple[str, ...] = (),
         max_message_octets: int = 1452,
         clock_error: float = 0.0,
-        make_hooks: Callable[[], SecurityHooks] = lambda: PLAINTEXT,
+        properties: Properties | None = None,
+        make_hooks: Callable[[], SecurityHooks] | None = None,
     ) -> Node:
         """A participant, on a host of its own unless it is given the ``address`` of another's."""
         number = len(self.nodes)
@@ -73,6 +75,7 @@ class Domain:
             peers=peers,
             max_message_octets=max_message_octets,
             clock_error=clock_error,
+            properties=properties or {},
             make_hooks=make_hooks,
         )
         node = Node(setup, self.network, self.dice.fork(), self._trace)

@@ -191,8 +191,9 @@ def _bound_flaws(node: Node) -> Iterator[str]:
                 yield f"{len(proxy.reorder)} samples wait for their turn in {reader.guid}"
     if engine.defrag_budget.octets > config.max_defrag_octets:
         yield f"{engine.defrag_budget.octets} octets of unfinished samples"
-    if engine.defrag_budget.octets != sum(remote.defragmenter.octets for remote in engine.remote_writers.values()):
-        yield f"{engine.defrag_budget.octets} octets of unfinished samples are counted wrongly"
+    counted = engine.defrag_budget.octets + engine.stateless_defrag_budget.octets
+    if counted != sum(remote.defragmenter.octets for remote in engine.remote_writers.values()):
+        yield f"{counted} octets of unfinished samples are counted wrongly"
     for writer in engine.local_writers.values():
         yield from _history_flaws(writer)
 

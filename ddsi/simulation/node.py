@@ -21,10 +21,11 @@ from ..engine import (
     StatusChanged,
     WriterProgress,
 )
-from ..spi import PLAINTEXT, SecurityHooks
+from ..spi import SecurityHooks, load_hooks
 from ..structure.guid import Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import Qos, reader_qos, writer_qos
+from ..structure.qos_policies import Properties
 from ..structure.status import Status
 from ..structure.vendor import OUR_VENDOR_ID
 from ..trace.events import Remark
@@ -41,7 +42,8 @@ _WALL_CLOCK_AT_START = 1_700_000_000 * 1_000_000_000  # nanoseconds since 1970
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeSetup:
     """Where a node stands and how it announces itself.  ``address``: its host, IPv4.  ``peers``: hosts to call by
-    unicast.  ``clock_error``: seconds that its wall clock is wrong by."""
+    unicast.  ``clock_error``: seconds that its wall clock is wrong by.  ``properties``: those of its QoS; security is
+    loaded by them, as in a participant with sockets, unless ``make_hooks`` makes other hooks."""
 
     name: str
     address: str
@@ -52,7 +54,8 @@ class NodeSetup:
     peers: tuple[str, ...] = ()
     max_message_octets: int = 1452
     clock_error: float = 0.0
-    make_hooks: Callable[[], SecurityHooks] = lambda: PLAINTEXT
+    properties: Properties = field(default_factory=dict)
+    make_hooks: Callable[[], SecurityHooks] | None = None
 
     def meets(self, other: NodeSetup) -> bool:
         """Are both in one domain, under one tag?"""
@@ -118,10 +121,11 @@ class Node:
                 announce_to=(*groups, *self._peer_locators()),
                 max_message_octets=setup.max_message_octets,
                 entity_name=setup.name,
+                properties=setup.properties,
             ),
             random=self._dice.fork_random(),
             wall_clock=self._wall_clock,
-            hooks=setup.make_hooks(),
+            hooks=self._make_hooks(),
             trace=self._trace,
         )
         engine.recorder = self._books = BookKeeper(engine, self._trace)
@@ -264,6 +268,11 @@ class Node:
 
     def _wall_clock(self) -> int:
         return _WALL_CLOCK_AT_START + int((self.now + self.setup.clock_error) * 1e9)
+
+    def _make_hooks(self) -> SecurityHooks:
+        if self.setup.make_hooks is not None:
+            return self.setup.make_hooks()
+        return load_hooks(self.setup.properties, entropy=self._dice.octets, wall_clock=self._wall_clock)
 
     def _peer_locators(self) -> Iterable[Locator]:
         """Each peer's host at every index that a participant there may have taken."""

@@ -6,8 +6,9 @@ so a failing seed tells what it did.  Its sizes are those of tests: a second sce
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import cycle
 
 from ..behavior.filtering_writer import FilteringWriter
 from ..config import Config
@@ -21,6 +22,7 @@ from ..structure.qos_policies import (
     KeepLast,
     Lifespan,
     Partition,
+    Properties,
     Reliable,
     ResourceLimits,
     TransientLocal,
@@ -38,6 +40,8 @@ __all__ = ["Failure", "Report", "Scenario"]
 
 _FILTERED = 3  # the topic whose writers filter
 _INTRODUCTION_S = 15.0
+_SECURED_INTRODUCTION_S = 60.0
+"""A handshake message has to arrive whole: in small fragments over a bad network that takes many attempts."""
 _REST_S = 120.0
 _QUIET_S = 30.0
 
@@ -212,9 +216,12 @@ class Scenario:
         for step in self.steps:
             yield f"- {step}"
 
-    def run(self, trace: TraceSink | None = None) -> Report:
-        """Live through it and check every invariant.  Raises Failure."""
-        return _Run(self, trace).run()
+    def run(self, trace: TraceSink | None = None, *, properties: Sequence[Properties] = ({},)) -> Report:
+        """Live through it and check every invariant.  Raises Failure.
+
+        The participants get ``properties`` by turns; those that configure security make it a secured domain.
+        """
+        return _Run(self, trace, properties).run()
 
 
 # --- making a plan -------------------------------------------------------------------------------------------------
@@ -334,19 +341,21 @@ class _Planner:
 
 
 class _Run:
-    def __init__(self, scenario: Scenario, trace: TraceSink | None) -> None:
+    def __init__(self, scenario: Scenario, trace: TraceSink | None, properties: Sequence[Properties]) -> None:
         self._scenario = scenario
         self._dice = Dice(scenario.seed ^ 0x5EED)
         self._domain = Domain(scenario.seed, conditions=scenario.conditions, trace=trace)
         self._plans: dict[int, list[EndpointPlan]] = {}
+        self._introduction_s = _SECURED_INTRODUCTION_S if any(properties) else _INTRODUCTION_S
         hosts = tuple(dict.fromkeys(scenario.hosts))
-        for host, config in zip(scenario.hosts, scenario.configs, strict=True):
+        for host, config, own in zip(scenario.hosts, scenario.configs, cycle(properties)):
             self._domain.node(
                 address=host,
                 config=config,
                 multicast=scenario.multicast,
                 peers=() if scenario.multicast else hosts,
                 max_message_octets=scenario.max_message_octets,
+                properties=own,
             )
 
     def run(self) -> Report:
@@ -367,7 +376,7 @@ class _Run:
         domain.network.heal()
         # A participant that was killed is remembered until its lease is over.
         longest = max(config.lease_duration for config in self._scenario.configs)
-        domain.run_until(lambda: domain.are_introduced() and domain.all_matched(), longest + _INTRODUCTION_S)
+        domain.run_until(lambda: domain.are_introduced() and domain.all_matched(), longest + self._introduction_s)
         self._check("some seconds after the network healed", invariants.matched(domain))
         for writer in domain.writers():
             writer.write()
@@ -388,7 +397,7 @@ class _Run:
         domain = self._domain
         domain.network.conditions = GOOD_WEATHER
         domain.run(5.0)
-        domain.run_until(self._is_at_rest, _INTRODUCTION_S)
+        domain.run_until(self._is_at_rest, self._introduction_s)
 
     def _check(self, when: str, flaws: list[str]) -> None:
         if flaws:
