@@ -30,6 +30,8 @@ class SecureSubmessage:
     """What can be told of a protected submessage before it is decoded: which decoder it needs, with which keys.
 
     Of a writer's submessage, ``datawriter`` sent it and ``datareader`` receives it; of a reader's the other way round.
+    Of INFO_SUBMESSAGE both are the sender's, which protects the submessages of both with one key: either decoder, given
+    the two, opens it.
     """
 
     category: SecureSubmessageCategory
@@ -50,7 +52,10 @@ class CryptoTransform(Protocol):
         sender: ParticipantCryptoHandle | DatawriterCryptoHandle | DatareaderCryptoHandle,
         receivers: int,
     ) -> Overhead:
-        """How many octets the encoders below add at most.  Asked before a message is packed.  Not the OMG's."""
+        """How many octets the encoders below add at most.  Asked before a message is packed.  Not the OMG's.
+
+        Of an endpoint: to its payloads and submessages; of a participant: to its messages.
+        """
         ...
 
     def encode_serialized_payload(

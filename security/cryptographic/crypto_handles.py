@@ -104,12 +104,13 @@ class RemoteParticipant(ParticipantCryptoHandle):
 
     def index(self, sender: RemoteWriter | RemoteReader, key_ids: Iterable[bytes]) -> None:
         """From now on these ids, and no others, announce submessages of ``sender``."""
-        for key_id, senders in list(self.senders.items()):
-            if sender in senders:
-                senders.remove(sender)
+        for key_id in sender.key_ids:
+            senders = self.senders[key_id]
+            senders.remove(sender)
             if not senders:
                 del self.senders[key_id]
-        for key_id in key_ids:
+        sender.key_ids = tuple(key_ids)
+        for key_id in sender.key_ids:
             self.senders.setdefault(key_id, []).append(sender)
 
     def wipe(self) -> None:
@@ -178,9 +179,12 @@ class LocalReader(DatareaderCryptoHandle):
 
 
 class RemoteReader(DatareaderCryptoHandle):
-    """A reader that ``writer`` is matched with.  ``ring``: the keys of its ACKNACKs; ``receiver_key``: for it."""
+    """A reader that ``writer`` is matched with.  ``ring``: the keys of its ACKNACKs; ``receiver_key``: for it.
 
-    __slots__ = ("participant", "receiver_key", "relay_only", "ring", "writer")
+    ``key_ids``: under which :meth:`RemoteParticipant.index` knows it.
+    """
+
+    __slots__ = ("key_ids", "participant", "receiver_key", "relay_only", "ring", "writer")
 
     def __init__(
         self,
@@ -196,9 +200,11 @@ class RemoteReader(DatareaderCryptoHandle):
         self.ring = ring
         self.receiver_key = receiver_key
         self.relay_only = relay_only
+        self.key_ids: tuple[bytes, ...] = ()
 
     def wipe(self) -> None:
         _wipe(self.receiver_key)
+        self.receiver_key = None
         if self.ring is not self.participant.exchange_ring:
             self.ring.wipe()
 
@@ -207,9 +213,12 @@ class RemoteReader(DatareaderCryptoHandle):
 
 
 class RemoteWriter(DatawriterCryptoHandle):
-    """A writer that ``reader`` is matched with.  ``ring``, ``payload_ring``: its keys; ``receiver_key``: for it."""
+    """A writer that ``reader`` is matched with.  ``ring``, ``payload_ring``: its keys; ``receiver_key``: for it.
 
-    __slots__ = ("participant", "payload_ring", "reader", "receiver_key", "ring")
+    ``key_ids``: under which :meth:`RemoteParticipant.index` knows it.
+    """
+
+    __slots__ = ("key_ids", "participant", "payload_ring", "reader", "receiver_key", "ring")
 
     def __init__(
         self,
@@ -225,9 +234,11 @@ class RemoteWriter(DatawriterCryptoHandle):
         self.ring = ring
         self.payload_ring = payload_ring
         self.receiver_key = receiver_key
+        self.key_ids: tuple[bytes, ...] = ()
 
     def wipe(self) -> None:
         _wipe(self.receiver_key, self.payload_ring)
+        self.receiver_key = None
         if self.ring is not self.participant.exchange_ring:
             self.ring.wipe()
 

@@ -116,6 +116,15 @@ class KeyMaterial:
         """The same with the key that one receiver alone is told."""
         return replace(self, receiver_specific_key_id=key_id, master_receiver_specific_key=key)
 
+    def copy(self) -> KeyMaterial:
+        """Another one with octets of its own, which are wiped by themselves."""
+        return replace(
+            self,
+            master_salt=self.master_salt.copy(),
+            master_sender_key=self.master_sender_key.copy(),
+            master_receiver_specific_key=self.master_receiver_specific_key.copy(),
+        )
+
     def wipe(self) -> None:
         for secret in (self.master_salt, self.master_sender_key, self.master_receiver_specific_key):
             secret[:] = bytes(len(secret))
@@ -133,6 +142,7 @@ def exchange_key_material(secret: SharedSecretHandle) -> KeyMaterial:
 
     HMAC with SHA-256; the hash is its key.
     """
+    assert secret.shared_secret, "a shared secret that was wiped"
     first, second = secret.challenge1, secret.challenge2
     salt_key = hashlib.sha256(first + b"keyexchange salt" + second).digest()
     sender_key = hashlib.sha256(second + b"key exchange key" + first).digest()

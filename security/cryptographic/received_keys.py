@@ -111,14 +111,17 @@ class KeyRing:
         return keys
 
     def replace(self, material: KeyMaterial) -> None:
-        """Put in a new key; of kind NONE, put in nothing.  A token that came twice changes nothing."""
+        """Put in a new key, or nothing if it is of kind NONE.  A token that came twice changes nothing.
+
+        The ring keeps a copy: a peer may use one key for two purposes, and either ring wipes its own.
+        """
         if self.current is not None and self.current.material == material:
             return
         if self.previous is not None:
             self.previous.wipe()
         self.previous = self.current
         self._previous_ends = self._clock() + _PREVIOUS_KEPT_NS
-        self.current = None if material.kind is TransformationKind.NONE else ReceivedKey(material)
+        self.current = None if material.kind is TransformationKind.NONE else ReceivedKey(material.copy())
         self._index()
 
     def wipe(self) -> None:

@@ -157,7 +157,9 @@ def test_a_remote_endpoint_leaves_nothing_behind() -> None:
     assert found.remote_writer.ring.current is None
     assert not any(any(key.material.master_sender_key) for key in received if key is not None)
     assert found.reader.submessage_key is not None, "its own keys are for others, too"
+    assert found.remote_writer.receiver_key is None
     alice.plugin.unregister_datareader(found.remote_reader)
+    assert found.remote_reader.receiver_key is None
     assert not found.writer.matched
     assert not alice.remote(bob).senders
 

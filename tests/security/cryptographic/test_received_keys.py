@@ -101,6 +101,14 @@ def test_a_token_that_comes_twice_changes_nothing() -> None:
     assert (keys.current, keys.previous) == (current, previous)
 
 
+def test_a_key_in_two_rings_is_wiped_in_one() -> None:
+    """A writer may protect submessages and payload with one key, and later change that of the payload."""
+    shared = material()
+    ring_of_submessages, ring_of_payloads = ring(shared), ring(shared)
+    ring_of_payloads.wipe()
+    assert payload.decode_payload(protected(material())[0], ring_of_submessages, None) == vectors.PAYLOAD
+
+
 def test_the_kind_none_is_no_key() -> None:
     keys = ring(material(), NO_KEY_MATERIAL)
     assert keys.current is None
