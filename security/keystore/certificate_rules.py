@@ -125,9 +125,8 @@ def _check_certificate(one: Certified, what: str, horizon: Horizon) -> Iterator[
     if horizon.now > not_after:
         yield EXPIRED.at(path, f"{what} expired at {validity.not_after:%Y-%m-%d %H:%M:%SZ}", remedy=renew)
     elif horizon.soon > not_after:
-        days = horizon.days_until(not_after)
-        yield EXPIRES_SOON.at(path, f"{what} expires at {validity.not_after:%Y-%m-%d %H:%M:%SZ}, in {days} days",
-                              remedy=renew)  # fmt: skip
+        text = f"{what} expires at {validity.not_after:%Y-%m-%d %H:%M:%SZ}, in {horizon.days_until(not_after)} days"
+        yield EXPIRES_SOON.at(path, text, remedy=renew)
     if horizon.now < not_before:
         yield NOT_YET_VALID.at(
             path,

@@ -95,6 +95,8 @@ def explain(enclave: Enclave, question: Question, *, now: int) -> Explanation:
     if rule is None:
         stages.append(("join", _no_domain_rule(enclave, documents.governance, question)))
         return _answer(subject, question, stages)
+    if rule.unsupported:
+        raise rule.unsupported[0]
     stages += _ask(enclave, documents, rule, question, now)
     return _answer(subject, question, stages, _protection(enclave.governance, documents, rule, question))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Literal
 
 from cryptography import x509
 
@@ -18,7 +19,7 @@ from .file_set import FileSet, read_file
 from .key_pair import Algorithm, private_key_pem
 from .keystore import IdentityTerms, Keystore, create_keystore
 from .options import governance_draft, rights
-from .survey import find_keystore
+from .survey import find_authority, find_keystore
 from .validity import Validity
 
 __all__ = ["create", "make_authority", "make_enclave", "make_governance", "make_identity", "make_permissions"]
@@ -135,14 +136,10 @@ def _sign(arguments: argparse.Namespace, kind: DocumentKind, xml: bytes) -> int:
     return _write(files, arguments, f"{kind}, signed")
 
 
-def _authority(arguments: argparse.Namespace, role: str) -> Authority:
+def _authority(arguments: argparse.Namespace, role: Literal["identity", "permissions"]) -> Authority:
     """The one that the options name."""
     if arguments.keystore and not (arguments.ca or arguments.ca_key):
-        keystore = find_keystore(arguments.keystore)
-        paths = {
-            "identity": (keystore.identity_ca_certificate, keystore.identity_ca_key),
-            "permissions": (keystore.permissions_ca_certificate, keystore.permissions_ca_key),
-        }[role]
+        paths = find_authority(arguments.keystore, role)
     elif arguments.ca and arguments.ca_key and not arguments.keystore:
         paths = arguments.ca, arguments.ca_key
     else:

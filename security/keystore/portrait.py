@@ -99,13 +99,9 @@ def _certificate(certificate: x509.Certificate, beside: Survey) -> Portrait:
         "authority": is_authority(certificate),
         "serial_number": f"{certificate.serial_number:x}",
         "sha256": certificate.fingerprint(hashes.SHA256()).hex(),
-        "guid_begins": _guid_begin(certificate),
+        # Of every participant with this identity; the lower Guid of two starts the handshake.
+        "guid_begins": subject_octets(certificate.subject.public_bytes()).hex(),
     }
-
-
-def _guid_begin(certificate: x509.Certificate) -> str:
-    """Six octets of every participant with this identity; the lower GUID of two starts the handshake."""
-    return subject_octets(certificate.subject.public_bytes()).hex()
 
 
 def _key(path: Path, beside: Survey) -> Portrait:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
@@ -25,7 +25,7 @@ from .file_set import read_file
 from .key_pair import PrivateKey, parse_private_key
 from .keystore import ENCLAVES, Keystore
 
-__all__ = ["Enclave", "Survey", "find_enclaves", "find_keystore", "key_files", "survey"]
+__all__ = ["Enclave", "Survey", "find_authority", "find_enclaves", "find_keystore", "key_files", "survey"]
 
 _MOST_FILES: Final = 5000
 _STANDARD_CAS: Final = ("identity_ca.cert.pem", "permissions_ca.cert.pem")
@@ -104,28 +104,39 @@ def _classify(path: Path, found: Survey) -> None:
 # --- keystores -----------------------------------------------------------------------------------------------
 
 
+def find_authority(root: Path, role: Literal["identity", "permissions"]) -> tuple[Path, Path]:
+    """Certificate and key of an authority in ``root``.  Raises ConfigurationError if one of them is not there."""
+    keystore = Keystore.at(root)
+    standard = {
+        "identity": (keystore.identity_ca_certificate, keystore.identity_ca_key),
+        "permissions": (keystore.permissions_ca_certificate, keystore.permissions_ca_key),
+    }
+    if all(path.is_file() for path in standard[role]):
+        return standard[role]
+    found = survey(root, root / _PUBLIC, root / _PRIVATE)
+    pairs = [(path, key) for path, one in found.authorities().items() if (key := found.key_of(one.public_key()))]
+    # One that is named for the other purpose is not for this.
+    mine, other = ("ident", "perm") if role == "identity" else ("perm", "ident")
+    candidates = [pair for pair in pairs if other not in pair[0].name.lower() or mine in pair[0].name.lower()]
+    if not candidates:
+        raise ConfigurationError(
+            f"{root} holds no {role} CA with its key: make a keystore with `ddsi keystore create`, or name the folder "
+            "that has both"
+        )
+    return next((pair for pair in candidates if mine in pair[0].name.lower()), candidates[0])
+
+
 def find_keystore(root: Path) -> Keystore:
     """The authorities and the governance document in ``root``.  Raises ConfigurationError naming what is not there."""
-    keystore = Keystore.at(root)
-    needed = (keystore.identity_ca_certificate, keystore.identity_ca_key, keystore.permissions_ca_certificate)
-    if all(path.is_file() for path in (*needed, keystore.permissions_ca_key, keystore.governance)):
-        return keystore
-    found = survey(root, root / _PUBLIC, root / _PRIVATE, root / ENCLAVES)
-    pairs = {path: key for path, one in found.authorities().items() if (key := found.key_of(one.public_key()))}
-    if not pairs:
-        raise ConfigurationError(
-            f"{root} holds no certificate authority with its key: make a keystore with `ddsi keystore create {root}`, "
-            "or name the folder that has them"
-        )
-    identity_ca = _named(list(pairs), "ident") or next(iter(pairs))
-    permissions_ca = _named(list(pairs), "perm") or identity_ca
-    governance = _governance(found)
+    identity_ca, permissions_ca = find_authority(root, "identity"), find_authority(root, "permissions")
+    governance = _governance(survey(root / ENCLAVES, root))
     if governance is None:
+        signed = Keystore.at(root).governance
         raise ConfigurationError(
-            f"{root} holds no signed governance document: make one with `ddsi keystore governance "
-            f"{keystore.governance.name} --ca {permissions_ca} --ca-key {pairs[permissions_ca]}`"
+            f"{root} holds no signed governance document: make it with `ddsi keystore governance {signed} "
+            f"--keystore {root}`"
         )
-    return Keystore(root, identity_ca, pairs[identity_ca], permissions_ca, pairs[permissions_ca], governance)
+    return Keystore(root, *identity_ca, *permissions_ca, governance)
 
 
 def find_enclaves(root: Path) -> list[Enclave]:

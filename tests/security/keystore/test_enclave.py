@@ -154,8 +154,23 @@ def test_documents_of_a_keystore_are_made_anew_with_its_own_authority(shell: She
 
 
 def test_what_a_keystore_lacks_is_named(shell: Shell, tmp_path: Path) -> None:
-    assert "holds no certificate authority with its key" in shell.refused("enclave", tmp_path, "alice")
+    assert f"{tmp_path} holds no identity CA with its key" in shell.refused("enclave", tmp_path, "alice")
     shell.make("ca", tmp_path / "ca.pem", tmp_path / "ca.key", "--subject", "/CN=CA")
     said = shell.refused("enclave", tmp_path, "alice")
-    assert "holds no signed governance document: make one with `ddsi keystore governance" in said
-    assert f"--ca {tmp_path}/ca.pem --ca-key {tmp_path}/ca.key" in said
+    signed = tmp_path / "enclaves/governance.p7s"
+    assert f"make it with `ddsi keystore governance {signed} --keystore {tmp_path}`" in said
+    shell.make("governance", signed, "--keystore", tmp_path)
+    shell.make("enclave", tmp_path, "alice")
+    assert {finding.rule.id for finding in check_keystore(tmp_path, Horizon.of_days(NOW, 30))} == {"shared-ca"}
+
+
+def test_an_authority_for_one_purpose_does_not_stand_in_for_the_other(shell: Shell, tmp_path: Path) -> None:
+    """Where whoever issues identities does not have the key of whoever signs permissions, and the other way round."""
+    shell.make("create", tmp_path, "--identity", "alice")
+    (tmp_path / "private/identity_ca.key.pem").unlink()
+    assert "holds no identity CA with its key" in shell.refused("enclave", tmp_path, "bob")
+    shell.make("governance", tmp_path / "g.p7s", "--keystore", tmp_path)
+    (tmp_path / "private/permissions_ca.key.pem").unlink()
+    assert "holds no permissions CA with its key" in shell.refused(
+        "governance", tmp_path / "h.p7s", "--keystore", tmp_path
+    )

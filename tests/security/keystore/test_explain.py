@@ -177,6 +177,13 @@ def test_what_cannot_be_asked_is_a_sentence(shell: Shell, workshop: Workshop, wo
     assert said in shell.refused("explain", workshop.write(), *words)
 
 
+def test_what_is_not_implemented_is_not_explained_away(shell: Shell, workshop: Workshop) -> None:
+    psk = "<rtps_psk_protection_kind>SIGN</rtps_psk_protection_kind>"
+    workshop.replace("governance", ("<topic_access_rules>", f"{psk}<topic_access_rules>"))
+    said = shell.refused("explain", workshop.write(), "join")
+    assert "<rtps_psk_protection_kind> of DDS Security 1.2 is not implemented" in said
+
+
 def test_files_that_no_participant_would_take_are_named(shell: Shell, workshop: Workshop) -> None:
     folder = workshop.write()
     genuine = (folder / "permissions.p7s").read_bytes()

@@ -20,7 +20,7 @@ from ddsi_security.keystore.portrait import portrait_lines, portray
 from .keystores import NOW, Workshop
 
 SOON = Horizon.of_days(NOW, 30)
-many = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+many = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture(scope="module")

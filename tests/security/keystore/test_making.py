@@ -108,7 +108,7 @@ CA = ("--ca", "ca.pem", "--ca-key", "ca.key")
         (["permissions", "p.p7s", *CA, "--xml", "governance.xml"], "it is a governance document, not permissions"),
         (["permissions", "p.p7s", *CA, "--subject", "/CN=a", "--topic", "a\0b"], "it is not XML"),
         (["governance", "g.p7s", *CA, "--keystore", "."], "which permissions CA?"),
-        (["governance", "g.p7s", "--keystore", "nowhere"], "nowhere holds no certificate authority with its key"),
+        (["governance", "g.p7s", "--keystore", "nowhere"], "nowhere holds no permissions CA with its key"),
     ],
 )
 def test_what_cannot_be_made_is_refused_in_one_sentence_and_nothing_is_written(
