@@ -175,7 +175,7 @@ def _from_der(digits: str) -> str:
     try:
         octets = bytes.fromhex(digits)
     except ValueError as error:
-        raise _malformed(f"#{digits[:40]} is not hexadecimal") from error
+        raise _malformed(f"{digits[:40]!r} is not hexadecimal") from error
     reader = DerReader(octets, "subject name")
     value = reader.next()
     reader.end()

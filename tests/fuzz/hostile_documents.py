@@ -304,6 +304,7 @@ def subject_names() -> Iterator[Made]:
     yield "attributes-1000", b",".join([b"CN=a"] * 1000), malformed
     yield "escape-at-the-end", b"CN=alice\\", malformed
     yield "escape-of-no-utf-8", b"CN=\\ff\\fe", malformed
+    yield "hex-of-control-characters", b"CN=#\0\x1b[31m", malformed
     yield "hex-cut-off", b"CN=#0c0", malformed
     yield "hex-of-4-gigabytes", b"CN=#0c84ffffffff41", malformed
     yield "quote-open", b'CN="alice', malformed

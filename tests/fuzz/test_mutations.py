@@ -52,7 +52,7 @@ def test_neighbours_get_an_answer(name: str, data: st.DataObject) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=1000)
+@settings(max_examples=400)
 @given(st.data())
 def test_many_neighbours_get_an_answer(name: str, data: st.DataObject) -> None:
     originals(name)
