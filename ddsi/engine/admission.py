@@ -38,20 +38,25 @@ class AdmissionDesk:
 
     def announced_again(self, proxy: ParticipantProxy, now: float) -> None:
         """It announced something new, or, refused before, announced itself once more."""
-        self.decided(proxy, self._engine.hooks.remote_participant_changed(proxy.data, now), now)
+        admission = self._engine.hooks.remote_participant_changed(proxy.data, now)
+        if isinstance(admission, Refused) or not proxy.is_admitted:
+            self.decided(proxy, admission, now)
 
     def decided(self, proxy: ParticipantProxy, admission: Admission, now: float) -> None:
         """This is what security says of it now.  An admitted one stays so until it is refused."""
         if isinstance(admission, Refused):
             self._refused(proxy, admission.reason, now)
-        elif proxy.is_admitted:
-            return
         elif admission is PENDING:
+            if proxy.is_admitted:
+                return
             proxy.refusal = ""
             self._step(proxy, SecurityStep.AUTHENTICATING)
             self._engine.builtin.match(proxy, Stage.IDENTIFIED, now)
         else:
             self._step(proxy, SecurityStep.ADMITTED)
+            if proxy.is_admitted:  # authenticated anew: it has lost what it knew of us
+                self._engine.discovery.endpoints_lost(proxy, LossReason.RESTARTED, now)
+                self._engine.builtin.match(proxy, Stage.IDENTIFIED, now)
             self._admit(proxy, now)
 
     def _admit(self, proxy: ParticipantProxy, now: float) -> None:

@@ -107,7 +107,12 @@ class Compute:
 
 @dataclass(frozen=True, slots=True)
 class Decided:
-    """Effect: what was PENDING about a participant, or about a (local, remote) pair, is decided now."""
+    """Effect: what was PENDING about a participant, or about a (local, remote) pair, is decided now.
+
+    A participant that is admitted already and is admitted so once more was authenticated anew: it has lost what it knew
+    of us (it may have started again under the same Guid), so what we know of its endpoints is void.  Each pair is
+    unmatched and asked about again; :meth:`SecurityHooks.remote_participant_lost` is not called.
+    """
 
     local: Guid
     remote: Guid

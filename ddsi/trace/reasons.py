@@ -100,7 +100,7 @@ class LossReason(StrEnum):
     PARTICIPANT_LOST = "participant_lost"
     """The endpoint went with its participant."""
     RESTARTED = "restarted"
-    """The same host and process came back under another GUID."""
+    """It has begun anew: its writers count from 1 again, or it authenticated once more."""
     CLOSED = "closed"
     """Our own endpoint or participant was closed."""
     QOS_CHANGED = "qos_changed"

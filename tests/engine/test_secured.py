@@ -24,13 +24,14 @@ from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import KeepAll, ManualByParticipant, Partition, Reliable, TransientLocal
 from ddsi.structure.status import SecurityRefused
 from ddsi.structure.vendor import PROTOCOL_VERSION
-from ddsi.trace.events import ParticipantLost, SecurityEvent
+from ddsi.trace.events import EndpointLost, ParticipantLost, SecurityEvent
 from ddsi.trace.reasons import DropReason, LossReason
 from ddsi.trace.sink import MemorySink
 
 from .xor_security import SECURE_BITS, STATUS_TOKEN, STRANGE_ISSUER, XorSecurity
 
 RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
+LATE = RELIABLE | Qos(durability=TransientLocal())
 TOPIC = "SecretOfTheDay"
 
 
@@ -391,6 +392,34 @@ def test_a_participant_that_starts_again_is_authenticated_again(goodbye: bool) -
     assert domain.run_until(lambda: writer.matched_count == 1 and writer.guid in reader.local.behavior.writers, 5)
     writer.write()
     assert domain.run_until(lambda: len(reader.taken) == 1, 5)
+
+
+def _samples(reader: NodeReader) -> list[int]:
+    return [change.sequence_number for info, change in reader.taken if info.valid_data]
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+def test_a_participant_that_starts_again_under_its_guid_begins_anew(loss: float) -> None:
+    """Whoever makes its Guid from host and process comes back so in a container; its numbers begin at 1 again."""
+    sink = MemorySink()
+    domain = Domain(conditions=LinkConditions(loss=loss), trace=sink)
+    a, b, writer, reader = talking(domain, qos=LATE)
+    back = b.writer("Answers", LATE)
+    writer.write()
+    back.write()
+    assert domain.run_until(lambda: len(reader.taken) == 1, 5)
+    guid = a.guid
+    a.kill()
+    a.start(guid.prefix)
+    writer, answers = a.writer(TOPIC, LATE), a.reader("Answers", LATE)
+    assert writer.guid == reader.taken[0][1].writer_guid, "which makes it hard"
+    for _ in range(3):
+        writer.write()
+    back.write()
+    assert domain.run_until(lambda: len(answers.taken) == 2 and len(_samples(reader)) == 4, 30)
+    assert guid.prefix in b.engine.participants
+    losses = [event for event in sink if isinstance(event, EndpointLost) and event.participant == b.guid.prefix]
+    assert [(event.endpoint, event.reason) for event in losses] == [(writer.guid, LossReason.RESTARTED)]
 
 
 def test_a_participant_that_was_lost_and_comes_back_is_authenticated_again() -> None:

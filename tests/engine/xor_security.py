@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import count
 
 from ddsi.spi import (
     ADMITTED,
@@ -60,10 +61,14 @@ _HEADER = b"\0\1\0\0"
 _MAC = b"MAC!"
 _RESEND_S = 0.2
 _LONG = bytes(4000)  # a handshake message is larger than a datagram
+_sessions = count(1)
 
 
 @dataclass
 class Peer:
+    """``session``: by which name it greets; another one is that of a program that has started since."""
+
+    session: bytes = b""
     greeted: bool = False
     answered: bool = False
     greet_at: float = 0.0
@@ -97,6 +102,7 @@ class XorSecurity(Plaintext):
 
     def local_participant(self, candidate: LocalParticipant) -> Guid:
         self.guid = candidate.guid
+        self.session = next(_sessions).to_bytes(8, "big")
         return candidate.guid
 
     def announcement(self) -> Announcement:
@@ -160,6 +166,7 @@ class XorSecurity(Plaintext):
     # --- messages and the clock --------------------------------------------------------------------------
 
     def receive_message(self, change: CacheChange, now: float) -> None:
+        self.now = now
         to, content = bytes(change.payload[4:16]), bytes(change.payload[16:])
         source = change.writer_guid
         peer = self.peers.get(source.prefix)
@@ -177,11 +184,14 @@ class XorSecurity(Plaintext):
                 self.effects.append(Decided(local, remote, ADMITTED))
 
     def _greeted_or_answered(self, peer: Peer, source: Guid, content: bytes) -> None:
+        if content[:1] == b"H" and peer.greeted and content[1:9] != peer.session:
+            self.remote_participant_lost(source.participant)
+            peer = self.peers[source.prefix] = Peer(greet_at=self.now)
         was_authenticated = peer.is_authenticated
         if content[:1] == b"H":
-            peer.greeted = True
-            self._send(STATELESS[0], source, b"W" + _LONG)
-        elif content[:1] == b"W":
+            peer.greeted, peer.session = True, content[1:9]
+            self._send(STATELESS[0], source, b"W" + content[1:9] + _LONG)
+        elif content[:1] == b"W" and content[1:9] == self.session:
             peer.answered = True
         if peer.is_authenticated and not was_authenticated:
             self.effects.append(Decided(self.guid, source.participant, ADMITTED))
@@ -190,7 +200,8 @@ class XorSecurity(Plaintext):
         for prefix, peer in self.peers.items():
             if not peer.answered and peer.greet_at <= now:
                 peer.greet_at = now + _RESEND_S
-                self._send(STATELESS[0], Guid.of(GuidPrefix(prefix), EntityId.PARTICIPANT), b"H" + _LONG)
+                to = Guid.of(GuidPrefix(prefix), EntityId.PARTICIPANT)
+                self._send(STATELESS[0], to, b"H" + self.session + _LONG)
 
     def next_deadline(self) -> float:
         return min((peer.greet_at for peer in self.peers.values() if not peer.answered), default=math.inf)
