@@ -15,6 +15,8 @@ __all__ = [
     "EndpointSecurityAttributesMask",
     "ParticipantSecurityAttributes",
     "ParticipantSecurityAttributesMask",
+    "PluginEndpointSecurityAttributesMask",
+    "PluginParticipantSecurityAttributesMask",
     "TopicSecurityAttributes",
 ]
 
@@ -41,6 +43,27 @@ class EndpointSecurityAttributesMask(IntFlag):
     IS_PAYLOAD_PROTECTED = 1 << 4
     IS_KEY_PROTECTED = 1 << 5
     IS_LIVELINESS_PROTECTED = 1 << 6
+    IS_VALID = 1 << 31
+
+
+class PluginParticipantSecurityAttributesMask(IntFlag):
+    """§9.4.2.3.  The builtin plugins' own word in PARTICIPANT_SECURITY_INFO: access control says it, cryptography acts."""
+
+    IS_RTPS_ENCRYPTED = 1 << 0
+    IS_DISCOVERY_ENCRYPTED = 1 << 1
+    IS_LIVELINESS_ENCRYPTED = 1 << 2
+    IS_RTPS_ORIGIN_AUTHENTICATED = 1 << 3
+    IS_DISCOVERY_ORIGIN_AUTHENTICATED = 1 << 4
+    IS_LIVELINESS_ORIGIN_AUTHENTICATED = 1 << 5
+    IS_VALID = 1 << 31
+
+
+class PluginEndpointSecurityAttributesMask(IntFlag):
+    """§9.4.2.5.  The builtin plugins' own word in ENDPOINT_SECURITY_INFO."""
+
+    IS_SUBMESSAGE_ENCRYPTED = 1 << 0
+    IS_PAYLOAD_ENCRYPTED = 1 << 1
+    IS_SUBMESSAGE_ORIGIN_AUTHENTICATED = 1 << 2
     IS_VALID = 1 << 31
 
 

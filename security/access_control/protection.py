@@ -6,9 +6,11 @@ DDS-Security 1.1 §9.4.1.2.3 (kinds), §9.4.2.3 (PluginParticipantSecurityAttrib
 
 from __future__ import annotations
 
-from enum import Enum, IntFlag
+from enum import Enum
 
-__all__ = ["PluginEndpointMask", "PluginParticipantMask", "ProtectionKind"]
+from ..attributes import PluginEndpointSecurityAttributesMask, PluginParticipantSecurityAttributesMask
+
+__all__ = ["ProtectionKind", "endpoint_mask", "participant_mask"]
 
 
 class ProtectionKind(Enum):
@@ -34,45 +36,26 @@ class ProtectionKind(Enum):
         return self.value.endswith("_WITH_ORIGIN_AUTHENTICATION")
 
 
-class PluginParticipantMask(IntFlag):
-    """§9.4.2.3; the second word of PARTICIPANT_SECURITY_INFO."""
-
-    IS_RTPS_ENCRYPTED = 1 << 0
-    IS_DISCOVERY_ENCRYPTED = 1 << 1
-    IS_LIVELINESS_ENCRYPTED = 1 << 2
-    IS_RTPS_ORIGIN_AUTHENTICATED = 1 << 3
-    IS_DISCOVERY_ORIGIN_AUTHENTICATED = 1 << 4
-    IS_LIVELINESS_ORIGIN_AUTHENTICATED = 1 << 5
-    IS_VALID = 1 << 31
-
-    @classmethod
-    def of(
-        cls, *, rtps: ProtectionKind, discovery: ProtectionKind, liveliness: ProtectionKind
-    ) -> PluginParticipantMask:
-        return (
-            cls.IS_VALID
-            | (cls.IS_RTPS_ENCRYPTED if rtps.is_encrypted else 0)
-            | (cls.IS_DISCOVERY_ENCRYPTED if discovery.is_encrypted else 0)
-            | (cls.IS_LIVELINESS_ENCRYPTED if liveliness.is_encrypted else 0)
-            | (cls.IS_RTPS_ORIGIN_AUTHENTICATED if rtps.is_origin_authenticated else 0)
-            | (cls.IS_DISCOVERY_ORIGIN_AUTHENTICATED if discovery.is_origin_authenticated else 0)
-            | (cls.IS_LIVELINESS_ORIGIN_AUTHENTICATED if liveliness.is_origin_authenticated else 0)
-        )
+def participant_mask(*, rtps: ProtectionKind, discovery: ProtectionKind, liveliness: ProtectionKind) -> int:
+    """The plugin's word of a participant (§9.4.2.3)."""
+    bit = PluginParticipantSecurityAttributesMask
+    return int(
+        bit.IS_VALID
+        | (bit.IS_RTPS_ENCRYPTED if rtps.is_encrypted else 0)
+        | (bit.IS_DISCOVERY_ENCRYPTED if discovery.is_encrypted else 0)
+        | (bit.IS_LIVELINESS_ENCRYPTED if liveliness.is_encrypted else 0)
+        | (bit.IS_RTPS_ORIGIN_AUTHENTICATED if rtps.is_origin_authenticated else 0)
+        | (bit.IS_DISCOVERY_ORIGIN_AUTHENTICATED if discovery.is_origin_authenticated else 0)
+        | (bit.IS_LIVELINESS_ORIGIN_AUTHENTICATED if liveliness.is_origin_authenticated else 0)
+    )
 
 
-class PluginEndpointMask(IntFlag):
-    """§9.4.2.5; the second word of ENDPOINT_SECURITY_INFO."""
-
-    IS_SUBMESSAGE_ENCRYPTED = 1 << 0
-    IS_PAYLOAD_ENCRYPTED = 1 << 1
-    IS_SUBMESSAGE_ORIGIN_AUTHENTICATED = 1 << 2
-    IS_VALID = 1 << 31
-
-    @classmethod
-    def of(cls, *, submessage: ProtectionKind, payload: ProtectionKind = ProtectionKind.NONE) -> PluginEndpointMask:
-        return (
-            cls.IS_VALID
-            | (cls.IS_SUBMESSAGE_ENCRYPTED if submessage.is_encrypted else 0)
-            | (cls.IS_PAYLOAD_ENCRYPTED if payload.is_encrypted else 0)
-            | (cls.IS_SUBMESSAGE_ORIGIN_AUTHENTICATED if submessage.is_origin_authenticated else 0)
-        )
+def endpoint_mask(*, submessage: ProtectionKind, payload: ProtectionKind = ProtectionKind.NONE) -> int:
+    """The plugin's word of an endpoint (§9.4.2.5)."""
+    bit = PluginEndpointSecurityAttributesMask
+    return int(
+        bit.IS_VALID
+        | (bit.IS_SUBMESSAGE_ENCRYPTED if submessage.is_encrypted else 0)
+        | (bit.IS_PAYLOAD_ENCRYPTED if payload.is_encrypted else 0)
+        | (bit.IS_SUBMESSAGE_ORIGIN_AUTHENTICATED if submessage.is_origin_authenticated else 0)
+    )

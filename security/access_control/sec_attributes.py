@@ -10,7 +10,7 @@ from typing import Final
 
 from ..attributes import EndpointSecurityAttributes, ParticipantSecurityAttributes, TopicSecurityAttributes
 from .governance import DomainRule, TopicRule
-from .protection import PluginEndpointMask, PluginParticipantMask, ProtectionKind
+from .protection import ProtectionKind, endpoint_mask, participant_mask
 
 __all__ = [
     "BUILTIN_TOPICS",
@@ -56,12 +56,10 @@ def participant_attributes(rule: DomainRule) -> ParticipantSecurityAttributes:
         is_rtps_protected=rule.rtps_protection_kind.is_protected,
         is_discovery_protected=rule.discovery_protection_kind.is_protected,
         is_liveliness_protected=rule.liveliness_protection_kind.is_protected,
-        plugin_participant_attributes=int(
-            PluginParticipantMask.of(
-                rtps=rule.rtps_protection_kind,
-                discovery=rule.discovery_protection_kind,
-                liveliness=rule.liveliness_protection_kind,
-            )
+        plugin_participant_attributes=participant_mask(
+            rtps=rule.rtps_protection_kind,
+            discovery=rule.discovery_protection_kind,
+            liveliness=rule.liveliness_protection_kind,
         ),
     )
 
@@ -86,8 +84,8 @@ def endpoint_attributes(rule: TopicRule) -> EndpointSecurityAttributes:
         is_submessage_protected=rule.metadata_protection_kind.is_protected,
         is_payload_protected=rule.data_protection_kind.is_protected,
         is_key_protected=rule.data_protection_kind.is_encrypted,
-        plugin_endpoint_attributes=int(
-            PluginEndpointMask.of(submessage=rule.metadata_protection_kind, payload=rule.data_protection_kind)
+        plugin_endpoint_attributes=endpoint_mask(
+            submessage=rule.metadata_protection_kind, payload=rule.data_protection_kind
         ),
     )
 
@@ -104,5 +102,5 @@ def builtin_endpoint_attributes(rule: DomainRule, topic: str) -> EndpointSecurit
         kind = ProtectionKind.NONE
     return EndpointSecurityAttributes(
         is_submessage_protected=kind.is_protected,
-        plugin_endpoint_attributes=int(PluginEndpointMask.of(submessage=kind)),
+        plugin_endpoint_attributes=endpoint_mask(submessage=kind),
     )

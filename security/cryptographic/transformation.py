@@ -7,18 +7,21 @@ Values only: keys are in :mod:`.key_material`, what they do to octets in :mod:`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from typing import Final
 
-from ..attributes import EndpointSecurityAttributes, ParticipantSecurityAttributes
+from ..attributes import (
+    EndpointSecurityAttributes,
+    ParticipantSecurityAttributes,
+    PluginEndpointSecurityAttributesMask,
+    PluginParticipantSecurityAttributesMask,
+)
 
 __all__ = [
     "HEADER_LENGTH",
     "KEY_ID_LENGTH",
     "MAC_LENGTH",
     "NO_KEY_ID",
-    "PluginEndpointSecurityAttributesMask",
-    "PluginParticipantSecurityAttributesMask",
     "Protection",
     "TransformationKind",
     "participant_protection",
@@ -73,27 +76,6 @@ class TransformationKind(IntEnum):
 
     def to_wire(self) -> bytes:
         return self.to_bytes(4, "big")
-
-
-class PluginParticipantSecurityAttributesMask(IntFlag):
-    """§9.4.2.3.  What ``plugin_participant_attributes`` tells this plugin."""
-
-    IS_RTPS_ENCRYPTED = 1 << 0
-    IS_DISCOVERY_ENCRYPTED = 1 << 1
-    IS_LIVELINESS_ENCRYPTED = 1 << 2
-    IS_RTPS_ORIGIN_AUTHENTICATED = 1 << 3
-    IS_DISCOVERY_ORIGIN_AUTHENTICATED = 1 << 4
-    IS_LIVELINESS_ORIGIN_AUTHENTICATED = 1 << 5
-    IS_VALID = 1 << 31
-
-
-class PluginEndpointSecurityAttributesMask(IntFlag):
-    """§9.4.2.5.  What ``plugin_endpoint_attributes`` tells this plugin."""
-
-    IS_SUBMESSAGE_ENCRYPTED = 1 << 0
-    IS_PAYLOAD_ENCRYPTED = 1 << 1
-    IS_SUBMESSAGE_ORIGIN_AUTHENTICATED = 1 << 2
-    IS_VALID = 1 << 31
 
 
 @dataclass(frozen=True, slots=True)
