@@ -14,7 +14,7 @@ from pathlib import Path
 import atheris
 
 # What is imported inside is instrumented: coverage of our code is what guides the search.
-with atheris.instrument_imports(include=["ddsi", "ddsi_security"]):
+with atheris.instrument_imports(include=["ddsi", "ddsi_security"]):  # pyright: ignore[reportAttributeAccessIssue]
     from tests.fuzz.corpus import kept
     from tests.fuzz.targets import TARGETS
 

@@ -133,7 +133,7 @@ class Role:
     changes: dict[tuple[Guid, int], bytes] = field(default_factory=dict)
     key_only: set[tuple[Guid, int]] = field(default_factory=set)
     clear: Counter[EntityId] = field(default_factory=Counter)
-    """Submessages of writers that came without any protection."""
+    """DATA by writer that came without an envelope of its own."""
 
     def __post_init__(self) -> None:
         governance = self.capture.facts["governance"]

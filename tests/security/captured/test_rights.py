@@ -42,6 +42,7 @@ from tests.security.captured.authenticated import (
     token_of,
 )
 from tests.security.captured.handshakes import handshakes
+from tests.security.captured.role import endpoint_attributes, participant_attributes
 from tests.security.captured.whole import decoded
 
 WRITERS = {SEDP_PUBLICATIONS_WRITER: False, SEDP_PUBLICATIONS_SECURE_WRITER: True}
@@ -143,6 +144,7 @@ def test_participants_announce_the_attributes_that_we_derive(name: str) -> None:
     ours = masks(plugin.get_participant_sec_attributes(local))
     announced = announced_participants(name)
     assert len(announced) == len(load(name).facts["guids"])
+    assert masks(participant_attributes(load(name).facts["governance"])) == ours, "what the crypto plugin was told"
     for data in announced.values():
         assert dict(data.security_parameters)[ParameterId.PARTICIPANT_SECURITY_INFO] == ours
 
@@ -164,6 +166,10 @@ def test_endpoints_announce_the_attributes_that_we_derive(name: str) -> None:
         )
         attributes = derive(local, data.topic_name, Partition(), ())
         assert dict(data.security_parameters)[ParameterId.ENDPOINT_SECURITY_INFO] == masks(attributes)
+        told = endpoint_attributes(load(name).facts["governance"], data.guid.entity_id)
+        assert told.plugin_endpoint_attributes == attributes.plugin_endpoint_attributes
+        assert told.is_submessage_protected == attributes.is_submessage_protected
+        assert told.is_payload_protected == attributes.is_payload_protected
         assert attributes.is_discovery_protected == is_secure
 
 
