@@ -76,7 +76,8 @@ class SubjectName:
         found = _one_line(stripped) if stripped.startswith("/") else _rfc4514(text)
         if not found:
             raise _malformed("it is empty")
-        return cls(tuple(sorted(found)), stripped)
+        # White space behind a backslash is part of the value.
+        return cls(tuple(sorted(found)), text.lstrip(_SPACE) if stripped.endswith("\\") else stripped)
 
     def __str__(self) -> str:
         return self.text
