@@ -293,6 +293,8 @@ class AdmissionDesk:
                     remote.handshake.close()
                 remote.handshake, remote.renewal = handshake, None
             remote.permissions = permissions
+            # The core is not told unless the peer turns out to have started again (KeyExchange.renew): anybody can ask
+            # for a renewal in a peer's name, and must not be able to tear its endpoints apart by that.
             self._keys.renew(remote, crypto, shared_secret)
             self._log(LogLevel.NOTICE_LEVEL, f"{remote.guid}, {subject}, authenticated anew", "authenticated")
         else:

@@ -47,7 +47,7 @@ class EndpointSecurityAttributesMask(IntFlag):
 
 
 class PluginParticipantSecurityAttributesMask(IntFlag):
-    """§9.4.2.3.  The builtin plugins' own word in PARTICIPANT_SECURITY_INFO: access control says it, cryptography acts."""
+    """§9.4.2.3.  The builtin plugins' word in PARTICIPANT_SECURITY_INFO: access control says it, cryptography acts."""
 
     IS_RTPS_ENCRYPTED = 1 << 0
     IS_DISCOVERY_ENCRYPTED = 1 << 1

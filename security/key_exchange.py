@@ -16,6 +16,7 @@ Only what a peer wrote under the key that the two share is looked at here, and i
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -77,7 +78,8 @@ class Outbox(Protocol):
 
 
 class KeyExchange:
-    """For one participant of ours.  ``decide(local, remote, admission)`` is called when a waiting pair is complete."""
+    """For one participant of ours.  ``decide(local, remote, admission)`` is called when a waiting pair is complete,
+    ``restarted(participant)`` for one that authenticated anew and has other keys than before."""
 
     def __init__(
         self,
@@ -87,12 +89,14 @@ class KeyExchange:
         is_rtps_protected: bool,
         outbox: Outbox,
         decide: Callable[[Guid, Guid, Admission], None],
+        restarted: Callable[[RemoteParticipant], None],
     ) -> None:
         self._cryptographic = cryptographic
         self._local_participant = local_participant
         self._is_rtps_protected = is_rtps_protected
         self._outbox = outbox
         self._decide = decide
+        self._restarted = restarted
         self.pairs: dict[tuple[Guid, Guid], Pair] = {}
         self.by_remote: dict[bytes, list[Pair]] = {}
         """The pairs of each remote endpoint, by its 16 octets."""
@@ -148,8 +152,10 @@ class KeyExchange:
     ) -> None:
         """The peer authenticated anew: it has none of our keys any more, and perhaps others of its own.
 
-        What was matched stays so; until the peer's keys have come again, nothing of it can be read.
+        What was matched stays so; until the peer's keys have come again, nothing of it can be read.  If then its
+        participant key is another one, it is another process: what was matched is void.
         """
+        participant.is_renewed = True
         former = [pair for pair in self.pairs.values() if pair.participant is participant]
         self.forget(participant)
         participant.crypto, participant.shared_secret = crypto, shared_secret
@@ -255,6 +261,11 @@ class KeyExchange:
         )
         if refusal is not None:
             return refusal
+        before, participant.keys_digest = participant.keys_digest, _digest(message)
+        if participant.is_renewed:
+            participant.is_renewed = False
+            if before and before != participant.keys_digest:
+                self._restarted(participant)
         if not participant.has_keys:
             participant.has_keys = True
             for pair in list(self.pairs.values()):
@@ -294,3 +305,10 @@ class KeyExchange:
         message, expiry = pair.participant.early.pop((pair.local.guid, pair.remote), (None, 0.0))
         if message is not None and now < expiry:
             self._endpoint_keys(pair, message)
+
+
+def _digest(message: GenericMessage) -> bytes:
+    """To recognise keys without keeping them."""
+    return hashlib.sha256(
+        b"".join(octets for token in message.message_data for _, octets in token.binary_properties)
+    ).digest()

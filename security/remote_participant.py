@@ -29,6 +29,9 @@ class RemoteParticipant:
     """``renewal``: another handshake, that will take the first one's place: the peer has lost what it knew of us.
     Whoever says so cannot prove it, so the next one is not begun before ``next_renewal``, in engine seconds.
 
+    ``keys_digest``: of the peer's participant key; after a renewal (``is_renewed``) another one shows that it has
+    started again under the same Guid.
+
     ``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first.
     """
 
@@ -43,6 +46,8 @@ class RemoteParticipant:
     shared_secret: SharedSecretHandle | None = None
     crypto: ParticipantCryptoHandle | None = None
     has_keys: bool = False
+    keys_digest: bytes = b""
+    is_renewed: bool = False
     early: dict[tuple[Guid, Guid], tuple[GenericMessage, float]] = field(default_factory=dict)
 
     @property

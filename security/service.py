@@ -78,6 +78,7 @@ class SecurityService:
             is_rtps_protected=own.attributes.is_rtps_protected,
             outbox=self._mailbox.post_keys,
             decide=lambda local, remote, admission: self._effects.append(Decided(local, remote, admission)),
+            restarted=lambda remote: self._effects.append(Decided(own.guid, remote.guid, ADMITTED)),
         )
         protection = self._protection = Protection(
             plugins.cryptographic, own.crypto, own.attributes, own.endpoints, self._remotes, self._keys

@@ -35,12 +35,13 @@ def properties_of(identity: str, governance: str = "governance") -> dict[str, st
 class Side:
     """One participant: its hooks, what it announces, what was decided, and its messages that are under way."""
 
-    def __init__(self, identity: str, governance: str = "governance", *, seed: int = 0) -> None:
+    def __init__(self, identity: str, governance: str = "governance", *, seed: int = 0, keys_seed: int = 0) -> None:
+        """``seed`` decides the Guid; ``keys_seed`` what is drawn after it."""
         self.clock_ns = NOW_NS
         properties = properties_of(identity, governance)
-        entropy: Callable[[int], bytes] = Random(f"{identity}{seed}").randbytes
+        entropy: Callable[[int], bytes] = Random(f"{identity}{seed} {keys_seed}").randbytes
         self.hooks: SecurityService = load(properties, entropy=entropy, wall_clock=lambda: self.clock_ns)
-        candidate = Guid(entropy(12) + EntityId.PARTICIPANT)
+        candidate = Guid(Random(f"{identity}{seed}").randbytes(12) + EntityId.PARTICIPANT)
         self.guid = self.hooks.local_participant(
             LocalParticipant(guid=candidate, domain_id=DOMAIN, domain_tag="", properties=properties)
         )

@@ -454,3 +454,25 @@ def test_a_generic_message_shows_no_key() -> None:
     key = message.message_data[0].binary_properties[0][1]
     assert key.hex() not in repr(message)
     assert repr(key) not in repr(message)
+
+
+@pytest.mark.parametrize("restarted", ["alice", "bob"])
+def test_who_comes_back_under_its_guid_with_other_keys_is_begun_anew_with(restarted: str) -> None:
+    """As a process in a container may.  Who only forgot us has the keys it had, and nothing is torn apart."""
+    alice, bob = trusting_pair()
+    sides = {"alice": alice, "bob": bob}
+    gone = sides[restarted]
+    other = bob if gone is alice else alice
+    back = sides[restarted] = Side(restarted, keys_seed=9)
+    assert back.guid == gone.guid
+    other.decided.clear()
+    back.hooks.remote_participant(other.data, 10.0)
+    for now in (10.0, 10.2, 10.5):
+        back.hooks.handle_timeout(now)
+        other.hooks.handle_timeout(now)
+        deliver(back, other, now=now)
+    assert back.has_admitted(other)
+    assert not other.has_admitted(back), "nothing shows yet that it is not the same"
+    match_builtin_topics(back, other)
+    deliver(back, other, now=11.0)
+    assert other.has_admitted(back)
