@@ -1,7 +1,7 @@
 """How octets are transformed: the kinds of the plugin, the protection that attributes ask for, and the CryptoHeader.
 
-DDS-Security 1.1 §9.4.2.3 to §9.4.2.5 (plugin attributes), §9.5.2.1 (transformation kinds), §9.5.2.3 (CryptoHeader).
-Values only: keys are in :mod:`.key_material`, what they do to octets in :mod:`.envelope` and :mod:`.payload`.
+DDS-Security 1.1 §9.5.2.1 (transformation kinds), §9.5.2.3 (CryptoHeader).  Values only: keys are in
+:mod:`.key_material`, what they do to octets in :mod:`.payload`, :mod:`.sealing` and :mod:`.opening`.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Refused, Rejected
+from ddsi_security.crypto_key_plugins import CryptoKeyExchange, CryptoKeyFactory
 from ddsi_security.crypto_transform_plugin import CryptoTransform, SecureSubmessageCategory
 from ddsi_security.cryptographic.aes_gcm import LARGE
 from ddsi_security.properties import KEY_SIZE, MAX_BLOCKS_PER_SESSION
@@ -104,10 +105,12 @@ def opened_by_id(bob: Participant, octets: Octets, sender: Participant) -> Octet
 # --- round trips -----------------------------------------------------------------------------------------------------
 
 
-def test_it_is_a_plugin() -> None:
+def test_it_is_all_three_plugins() -> None:
     """Which mypy checks here."""
-    plugin: CryptoTransform = Participant(1).plugin
-    assert plugin is not None
+    factory: CryptoKeyFactory = Participant(1).plugin
+    exchange: CryptoKeyExchange = Participant(1).plugin
+    transform: CryptoTransform = Participant(1).plugin
+    assert type(factory) is type(exchange) is type(transform)
 
 
 @pytest.mark.parametrize("of", [bytes, bytearray, memoryview])
@@ -311,6 +314,8 @@ def test_of_several_local_readers_the_one_addressed_is_found(kind: Kind) -> None
         assert not isinstance(found, Outcome)
         assert found.datareader is to.reader
         assert opened_by_id(bob, octets, alice) == vectors.HEARTBEAT
+        cut = bob.plugin.preprocess_secure_submsg(octets[:-1], bob.handle, bob.remote(alice))
+        assert isinstance(cut, Rejected)
     for_all = sealed_submessage(alice, first, vectors.HEARTBEAT, *others)
     assert opened_by_id(bob, for_all, alice) == vectors.HEARTBEAT
 
