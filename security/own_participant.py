@@ -6,7 +6,7 @@ fails here, in the very call that asked for it, and leaves nothing behind.
 
 from __future__ import annotations
 
-from typing import Final, TypeVar
+from typing import Final, TypeVar, cast
 
 from ddsi.serialization import ParameterId
 from ddsi.spi import Announcement, LocalParticipant, ProtectedEndpoint, Refused
@@ -179,9 +179,7 @@ class OwnParticipant:
 
 def settled(result: T | Pending[T]) -> T:
     """While a participant is being created there is nobody else to serve: slow work is done on the spot."""
-    while isinstance(result, Pending):
-        result = result.job()
-    return result
+    return cast(T, result.job() if isinstance(result, Pending) else result)
 
 
 def _insist(refusal: Refused | None) -> None:
