@@ -7,6 +7,7 @@ is written to ``.fuzz/found`` and ends the run.  See ``docs/fuzzing.md``.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ import atheris
 # What is imported inside is instrumented: coverage of our code is what guides the search.
 with atheris.instrument_imports(include=["ddsi", "ddsi_security"]):  # pyright: ignore[reportAttributeAccessIssue]
     from tests.fuzz.corpus import kept
+    from tests.fuzz.target import Target
     from tests.fuzz.targets import TARGETS
 
 KEPT = Path(".fuzz")
@@ -31,7 +33,10 @@ def fuzz(name: str, seconds: int) -> None:
     found.mkdir(exist_ok=True)
     for number, octets in enumerate([*(entry.octets for entry in kept(name)), *target.seeds()]):
         (folder / f"seed-{number}").write_bytes(octets[: target.most_octets])
+    words = folder.with_suffix(".words")
+    words.write_text("".join(f'"{word}"\n' for word in _words(target)))
     options = [
+        f"-dict={words}",
         f"-max_total_time={seconds}",
         f"-max_len={target.most_octets}",
         f"-timeout={SECONDS_FOR_ONE_INPUT}",
@@ -46,6 +51,14 @@ def fuzz(name: str, seconds: int) -> None:
 
     atheris.Setup([sys.argv[0], *options], one_input)
     atheris.Fuzz()
+
+
+def _words(target: Target) -> list[str]:
+    """Those of its seeds, and tags."""
+    if not target.is_text:
+        return []
+    text = b"\n".join(target.seeds()).decode("latin-1")
+    return sorted(set(re.findall(r"</?[a-z_]+>|[A-Za-z][A-Za-z_/-]{2,40}", text)))
 
 
 def fuzz_all(seconds: int) -> None:

@@ -202,11 +202,15 @@ def subject_names() -> list[bytes]:
 
 
 DOCUMENT_TARGETS = {
-    "signed_document": Target(signed_document, signed_documents),
+    "signed_document": Target(signed_document, signed_documents, is_text=True),
     "cms": Target(cms, cms_blocks, 2048),
-    "governance": Target(governance, lambda: [xml_of(path.name) for path in sorted(KEYSTORE.glob("governance*.xml"))]),
-    "permissions": Target(permissions, lambda: [xml_of("alice.permissions.xml")]),
-    "remote_permissions": Target(remote_permissions, lambda: [signed(xml_of("alice.permissions.xml"))], 8192),
+    "governance": Target(
+        governance, lambda: [xml_of(path.name) for path in sorted(KEYSTORE.glob("governance*.xml"))], is_text=True
+    ),
+    "permissions": Target(permissions, lambda: [xml_of("alice.permissions.xml")], is_text=True),
+    "remote_permissions": Target(
+        remote_permissions, lambda: [signed(xml_of("alice.permissions.xml"))], 8192, is_text=True
+    ),
     "topic_expression": Target(topic_expression, topic_expressions, 512),
-    "subject_name": Target(subject_name, subject_names, 512),
+    "subject_name": Target(subject_name, subject_names, 512, is_text=True),
 }

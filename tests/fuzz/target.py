@@ -26,6 +26,8 @@ class Target:
     seeds: Callable[[], Iterable[bytes]]
     most_octets: int = 4096
     """Longer inputs are cut: what is interesting happens in few octets, and short ones are tried faster."""
+    is_text: bool = False
+    """Made of words: a fuzzer that is told them gets further than one that must spell them."""
     enormous: int = 8 << 20
     """Octets that must not be too many for it; a datagram cannot have more than 65,507."""
     good: str = ACCEPTED
