@@ -1,16 +1,19 @@
 """The matrix: what any publisher and any subscriber are put through together, and what came of it.
 
-A case is a short play for two programs (``stories.py``); ``cases.py`` and ``secured.py`` list them; ``outcome.py`` runs
-one and says how it ended.  ``test_interop.py`` and ``python -m multiproc_tests.interop`` are the two ways in.
+A case is a short play for two programs (``stories.py``); ``cases.py``, ``secured.py`` and ``refusals.py`` list them;
+``outcome.py`` runs one and says how it ended.  ``test_interop.py`` and ``python -m multiproc_tests.interop`` are the
+two ways in.
 """
 
 from .cases import CASES, Case
 from .outcome import Outcome, Verdict, missing_ability, run_case
+from .refusals import REFUSAL_CASES
 from .secured import SECURED_CASES
 
 __all__ = [
     "ALL_CASES",
     "CASES",
+    "REFUSAL_CASES",
     "SECURED_CASES",
     "Case",
     "Outcome",
@@ -20,7 +23,7 @@ __all__ = [
     "run_case",
 ]
 
-ALL_CASES = (*CASES, *SECURED_CASES)
+ALL_CASES = (*CASES, *SECURED_CASES, *REFUSAL_CASES)
 
 
 def find_case(name: str) -> Case:
