@@ -54,10 +54,11 @@ class AdmissionDesk:
             self._engine.builtin.match(proxy, Stage.IDENTIFIED, now)
         else:
             self._step(proxy, SecurityStep.ADMITTED)
-            if proxy.is_admitted:  # authenticated anew: it has lost what it knew of us
+            if proxy.is_admitted:  # once more: it has started again, and has authenticated anew
                 self._engine.discovery.endpoints_lost(proxy, LossReason.RESTARTED, now)
-                self._engine.builtin.match(proxy, Stage.IDENTIFIED, now)
-            self._admit(proxy, now)
+                self._engine.builtin.begin_anew(proxy, now)
+            else:
+                self._admit(proxy, now)
 
     def _admit(self, proxy: ParticipantProxy, now: float) -> None:
         proxy.refusal = ""

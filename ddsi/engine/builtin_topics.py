@@ -116,8 +116,8 @@ class BuiltinTopics:
                     self._decide(reader.guid, writer_data, self._engine.hooks.match(reader.guid, writer_data), now)
 
     def decided(self, local: Guid, remote: Guid, admission: Admission, now: float) -> None:
-        """Security made up its mind about a pair that was pending."""
-        data = self._pending.pop((local, remote), None)
+        """Security made up its mind about a pair that was pending; or, matched already, the pair is to begin anew."""
+        data = self._pending.pop((local, remote), None) or self._unmatch(local, remote, now)
         if data is not None:
             self._decide(local, data, admission, now)
 
@@ -143,19 +143,39 @@ class BuiltinTopics:
         else:
             engine.matchmaker.attach_writer(engine.local_readers[local], data, proxy, proxy.metatraffic, now)
 
+    # --- the end of matches ------------------------------------------------------------------------------
+
     def participant_lost(self, proxy: ParticipantProxy, now: float) -> None:
         """Nothing of it stays in any table; the hooks hear of the participant, not of each pair."""
+        self._forget(proxy, self._topics, now)
+
+    def begin_anew(self, proxy: ParticipantProxy, now: float) -> None:
+        """It started again: its numbers and ours are void, but for the topics that security begins anew by itself."""
+        self._forget(proxy, [topic for topic in self._topics if not topic.is_directed], now)
+        self.match(proxy, Stage.ADMITTED, now)
+
+    def _forget(self, proxy: ParticipantProxy, topics: list[BuiltinTopic], now: float) -> None:
+        for topic in topics:
+            for ours, theirs in ((topic.writer_id, topic.reader_id), (topic.reader_id, topic.writer_id)):
+                remote = Guid.of(proxy.prefix, theirs)
+                self._pending.pop((self._guid(ours), remote), None)
+                self._unmatch(self._guid(ours), remote, now)
+
+    def _unmatch(self, local: Guid, remote: Guid, now: float) -> EndpointData | None:
+        """Undo :meth:`_match`; returns what was known of the remote endpoint, if the two were matched."""
         engine = self._engine
-        for topic in self._topics:
-            writer, reader = self.writer(topic.writer_id), self.reader(topic.reader_id)
-            if writer is not None:
-                writer.behavior.matched_reader_remove(Guid.of(proxy.prefix, topic.reader_id), now)
-                engine.receivers_changed(writer)
-                engine.writer_answers(writer, writer.behavior.unsent_changes(now))  # the window may have waited for it
-            if reader is not None:
-                engine.matchmaker.detach_writer(reader, Guid.of(proxy.prefix, topic.writer_id), now)
-        for pair in [pair for pair in self._pending if pair[1].startswith(proxy.prefix)]:
-            del self._pending[pair]
+        writer, reader = engine.local_writers.get(local), engine.local_readers.get(local)
+        if writer is not None and remote in writer.behavior.readers:
+            reader_data = writer.behavior.readers[remote].data
+            writer.behavior.matched_reader_remove(remote, now)
+            engine.receivers_changed(writer)
+            engine.writer_answers(writer, writer.behavior.unsent_changes(now))  # the window may have waited for it
+            return reader_data
+        if reader is not None and remote in reader.behavior.writers:
+            writer_data = reader.behavior.writers[remote].data
+            engine.matchmaker.detach_writer(reader, remote, now)
+            return writer_data
+        return None
 
     def _guid(self, entity_id: EntityId) -> Guid:
         return Guid.of(self._engine.guid.prefix, entity_id)

@@ -261,6 +261,7 @@ class DiscoveryAgent:
         if proxy is None:
             return
         self.endpoints_lost(proxy, LossReason.PARTICIPANT_LOST, now)
+        engine.builtin.participant_lost(proxy, now)
         del engine.participants[proxy.prefix]
         engine.alarms.no_lease(proxy)
         engine.hooks.remote_participant_lost(proxy.guid)
@@ -271,13 +272,12 @@ class DiscoveryAgent:
         engine.discovery_changed()
 
     def endpoints_lost(self, proxy: ParticipantProxy, reason: LossReason, now: float) -> None:
-        """All that it announced is void, and what its builtin endpoints and ours know of each other."""
+        """All that it announced is void."""
         engine = self._engine
         for writer_data in engine.known_writers.of_participant(proxy.prefix):
             self._writer_lost(writer_data.guid, reason, now)
         for reader_data in engine.known_readers.of_participant(proxy.prefix):
             self._reader_lost(reader_data.guid, reason, now)
-        engine.builtin.participant_lost(proxy, now)
 
     def lease_due(self, prefix: bytes, now: float) -> None:
         proxy = self._engine.participants.get(prefix)

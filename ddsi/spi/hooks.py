@@ -109,9 +109,11 @@ class Compute:
 class Decided:
     """Effect: what was PENDING about a participant, or about a (local, remote) pair, is decided now.
 
-    A participant that is admitted already and is admitted so once more was authenticated anew: it has lost what it knew
-    of us (it may have started again under the same Guid), so what we know of its endpoints is void.  Each pair is
-    unmatched and asked about again; :meth:`SecurityHooks.remote_participant_lost` is not called.
+    Who is admitted already and is admitted once more begins anew.  A participant: it has started again under the same
+    Guid, so what we know of its endpoints is void; they are unmatched, and builtin pairs asked about again.
+    :meth:`SecurityHooks.remote_participant_lost` is not called, and the topics by which security itself talks
+    (ParticipantStatelessMessage, ParticipantVolatileMessageSecure) are left alone.  A pair of these: its numbers are
+    void, and what was not acknowledged is dropped, as a peer that was authenticated anew may count from 1 again.
     """
 
     local: Guid

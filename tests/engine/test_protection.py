@@ -189,25 +189,33 @@ def test_spdp_of_a_participant_that_is_not_known_is_not_asked_about() -> None:
     assert hooks.asked == []
 
 
-def test_heartbeats_in_clear_do_not_make_an_authenticated_participant_begin_anew() -> None:
-    here, hooks, there = matched()
+class Authenticated(Wrapped):
+    """The participant may not say in clear that it changed; its endpoints may speak in clear."""
 
-    class Lax(Wrapped):
-        def admits(self, sender: bytes, protection: int) -> bool:
-            return sender[12:] != ids.SPDP_WRITER
+    def admits(self, sender: bytes, protection: int) -> bool:
+        return sender[12:] != ids.SPDP_WRITER
 
-    here.inbound._hooks = Lax()
-    proxy = here.participants[there.prefix]
+
+@pytest.mark.parametrize("is_authenticated", [False, True])
+def test_an_authenticated_participant_does_not_begin_anew_by_heartbeats_in_clear(is_authenticated: bool) -> None:
+    """The writer whose numbers contradict what was known does, alone: whoever can forge them can forge its gaps too."""
+    here, _, there = matched()
+    if is_authenticated:
+        here.inbound._hooks = Authenticated()
+    participant, (reader,) = here.participants[there.prefix], here.user_readers()
+    (before,) = reader.behavior.writers.values()
     here.receive_datagram(there.message(Gap(READER, WRITER, 1, NumberSet(50)).encode()), there.address, 0.0)
     for count in range(1, 5):
-        beat = Heartbeat(READER, WRITER, 1, 3, count, final=True).encode()
+        beat = Heartbeat(EntityId.UNKNOWN, WRITER, 1, 1, count, final=True).encode()
         here.receive_datagram(there.message(beat), there.address, 0.1 * count)
-    assert here.participants[there.prefix] is proxy
-    here.inbound._hooks = hooks
-    for count in range(5, 8):
-        beat = Heartbeat(READER, WRITER, 1, 3, count, final=True).encode()
-        here.receive_datagram(there.message(beat), there.address, 0.1 * count)
-    assert here.participants[there.prefix] is not proxy, "where nobody forbids it"
+    assert (here.participants[there.prefix] is participant) is is_authenticated
+    if is_authenticated:
+        (proxy,) = reader.behavior.writers.values()
+        assert proxy is not before
+        data = Data(EntityId.UNKNOWN, WRITER, 1, None, b"\0\1\0\0abcd").encode()
+        here.receive_datagram(there.message(data), there.address, 0.5)
+        assert proxy.next_sn == 2
+        assert reader.matched.total_count == reader.liveliness.alive_count == 1, "the application noticed nothing"
 
 
 @pytest.mark.parametrize(("is_hidden", "key_hash"), [(False, b"\7".ljust(16, b"\0")), (True, md5(b"\7").digest())])

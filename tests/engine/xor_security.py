@@ -66,9 +66,10 @@ _sessions = count(1)
 
 @dataclass
 class Peer:
-    """``session``: by which name it greets; another one is that of a program that has started since."""
+    """``session``: by which name it greets; another is that of a program that has started since (``is_renewed``)."""
 
     session: bytes = b""
+    is_renewed: bool = False
     greeted: bool = False
     answered: bool = False
     greet_at: float = 0.0
@@ -186,7 +187,7 @@ class XorSecurity(Plaintext):
     def _greeted_or_answered(self, peer: Peer, source: Guid, content: bytes) -> None:
         if content[:1] == b"H" and peer.greeted and content[1:9] != peer.session:
             self.remote_participant_lost(source.participant)
-            peer = self.peers[source.prefix] = Peer(greet_at=self.now)
+            peer = self.peers[source.prefix] = Peer(greet_at=self.now, is_renewed=peer.is_authenticated)
         was_authenticated = peer.is_authenticated
         if content[:1] == b"H":
             peer.greeted, peer.session = True, content[1:9]
@@ -194,7 +195,16 @@ class XorSecurity(Plaintext):
         elif content[:1] == b"W" and content[1:9] == self.session:
             peer.answered = True
         if peer.is_authenticated and not was_authenticated:
+            if peer.is_renewed:
+                self._begin_anew(source.prefix)
             self.effects.append(Decided(self.guid, source.participant, ADMITTED))
+
+    def _begin_anew(self, prefix: GuidPrefix) -> None:
+        """Its volatile endpoints count from 1 again, and it has to be told our key."""
+        writer, reader = VOLATILE
+        for ours, theirs in ((writer, reader), (reader, writer)):
+            self.effects.append(Decided(Guid.of(self.guid.prefix, ours), Guid.of(prefix, theirs), ADMITTED))
+        self._send(writer, Guid.of(prefix, reader), b"P" + bytes((_key(self.guid),)))
 
     def handle_timeout(self, now: float) -> None:
         for prefix, peer in self.peers.items():
