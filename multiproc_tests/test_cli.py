@@ -371,34 +371,49 @@ async def test_a_file_that_cannot_be_written() -> None:
 @pytest.mark.peers
 @async_test
 async def test_demo_with_a_foreign_peer() -> None:
-    """Data flows between two processes of ours and one of Cyclone DDS; it ends by itself with 0, without a terminal."""
+    """Data flows between two processes of ours and one of Cyclone DDS, then between a secured pair; an intruder is kept
+    out.  It ends by itself with 0, without a terminal."""
     CYCLONE_PYTHON.locate()
     with namespace() as host:
         async with scenario("demo", deadline=60) as stage:
             demo = await _ddsi(stage, host, "demo")
             await demo.close_input()
-            lines = await _output(demo, timeout=55)
-    assert lines[-3:] == [
+            lines = await _output(demo, timeout=58)
+    for line in (
         "subscriber received all 40 samples of publisher.",
         "subscriber received all 40 samples of cyclonedds.",
         "cyclonedds received all 40 samples of publisher.",
-    ]
+        "bob received all 20 samples of alice.",
+    ):
+        assert line in lines
     assert sum(line.startswith("cyclonedds received Square BLUE ") for line in lines) == 40
     assert sum(line.startswith("subscriber received ") for line in lines) == 80 + 2
+    assert sum(line.startswith("bob        received Square GREEN ") for line in lines) == 20
+    assert not any(line.startswith("bob        received Square RED ") for line in lines)
+    (told,) = (line for line in lines if line.startswith("mallory    may not "))
+    assert re.search(r"permissions\.p7s, grant 'mallory' \(line \d+\): .* Missing right: publish .*'Square'", told)
+    assert any(line.startswith("bob        refused  permissions of 'CN=mallory'") for line in lines)
+    assert re.fullmatch(r"On the wire: BLUE of .* GREEN of alice not once in [\d,]+\.", lines[-1])
     assert not any("\x1b" in line for line in lines)
 
 
-_WITHOUT_CYCLONE = "import sys; sys.modules['cyclonedds'] = None; from ddsi.cli import main; sys.exit(main(['demo']))"
+def _without(*packages: str) -> list[str]:
+    """The demo, where these packages are not installed."""
+    absent = "; ".join(f"sys.modules[{name!r}] = None" for name in packages)
+    return [sys.executable, "-c", f"import sys; {absent}; from ddsi.cli import main; sys.exit(main(['demo']))"]
 
 
 @async_test
-async def test_demo_without_a_foreign_peer() -> None:
+async def test_demo_without_a_foreign_peer_and_without_security() -> None:
     with namespace() as host:
         async with scenario("demo of ours", deadline=60) as stage:
-            demo = await stage.start("demo", [sys.executable, "-c", _WITHOUT_CYCLONE], namespace=host)
+            demo = await stage.start("demo", _without("cyclonedds", "cryptography"), namespace=host)
             lines = await _output(demo, timeout=55)
     assert lines[1].startswith("No other DDS is installed here")
-    assert lines[-1] == "subscriber received all 40 samples of publisher."
+    assert lines[-2:] == [
+        "subscriber received all 40 samples of publisher.",
+        "Security is not shown: cryptography missing; pip install 'ddsi[security]'.",
+    ]
 
 
 @async_test
@@ -412,7 +427,7 @@ async def test_demo_with_a_foreign_peer_that_does_not_start(tmp_path: Path) -> N
             demo = await _ddsi(stage, host, "demo", PYTHONPATH=str(tmp_path))
             lines = await _output(demo, timeout=55)
     assert "does not start (ImportError: no libddsc here)" in lines[1]
-    assert lines[-1] == "subscriber received all 40 samples of publisher."
+    assert "subscriber received all 40 samples of publisher." in lines
 
 
 @async_test
@@ -420,7 +435,7 @@ async def test_demo_says_what_did_not_arrive() -> None:
     """In a network without even a loopback: status 1, a clear sentence, and what the processes said."""
     with bare_namespace() as host:
         async with scenario("demo without a network", deadline=60) as stage:
-            demo = await stage.start("demo", [sys.executable, "-c", _WITHOUT_CYCLONE], namespace=host)
+            demo = await stage.start("demo", _without("cyclonedds"), namespace=host)
             await demo.expect_exit(1, timeout=55)
             sentence, *details = _errors(demo)
     assert sentence == "ddsi demo: subscriber received 0 of 40 samples of publisher"

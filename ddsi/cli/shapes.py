@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import random
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 import trio
 
+from ..config.secure import secure
 from ..dcps import DataReader, DataWriter, DomainParticipant, Publisher, Subscriber, Topic
 from ..structure.errors import DdsTimeout
 from ..structure.guid import Guid
@@ -30,6 +32,7 @@ from ..structure.status import (
     OfferedIncompatibleQos,
     PublicationMatched,
     RequestedIncompatibleQos,
+    SecurityRefused,
     Status,
     SubscriptionMatched,
 )
@@ -81,6 +84,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="pub: begin when so many readers are matched (with --time: at most so long)",
     )
     parser.add_argument("--at-end", choices=("dispose", "unregister"), help="pub: what becomes of the instances")
+    parser.add_argument(
+        "--secure",
+        type=Path,
+        metavar="DIR",
+        help="with the identity and the rights in this folder, such as `ddsi keystore create` makes",
+    )
     qos = parser.add_argument_group("QoS")
     reliability = qos.add_mutually_exclusive_group()
     reliability.add_argument("-r", "--reliable", action="store_true", help="default for pub")
@@ -140,9 +149,12 @@ class _Role:
     async def run(self) -> int:
         status: int = ExitStatus.OK
         qos = Qos(entity_name=f"ddsi shapes {self.arguments.role}")
+        if self.arguments.secure:
+            qos |= secure(self.arguments.secure)
         try:
             async with DomainParticipant(self.arguments.domain, qos=qos) as participant, trio.open_nursery() as nursery:
                 nursery.start_soon(self.display.paint)
+                nursery.start_soon(self._watch_participant, participant)
                 status = await self.play(participant, nursery)
                 nursery.cancel_scope.cancel()
         finally:
@@ -170,6 +182,12 @@ class _Role:
             qos |= Qos(data_representation=DataRepresentation(chosen))
         return qos
 
+    async def _watch_participant(self, participant: DomainParticipant) -> None:
+        """Tell of whoever security keeps out altogether."""
+        async for event in participant.events():
+            if isinstance(event, SecurityRefused):
+                self.display.notice(f"refused participant {event.remote}: {event.reason}")
+
     async def watch(self, entity: DataWriter[Shape] | DataReader[Shape]) -> None:
         """Tell of matches, and of whoever does not match."""
         topic = entity.topic.name
@@ -188,6 +206,8 @@ class _Role:
                 self._tell_incompatible(topic, "writer", event.last_publication_handle, event)
             case InconsistentTopic():
                 self.display.notice(f"{topic}: somebody uses it for another type, {event.remote_type_name}")
+            case SecurityRefused():
+                self.display.notice(f"{topic}: refused {event.remote}: {event.reason}")
             case _:
                 pass  # Deadlines and the like are not set here.
 

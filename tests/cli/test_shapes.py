@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +19,7 @@ from ddsi.structure.status import (
     InconsistentTopic,
     PublicationMatched,
     RequestedIncompatibleQos,
+    SecurityRefused,
 )
 from ddsi.xtypes import deserialize, serialize
 
@@ -65,6 +67,14 @@ def test_a_topic_named_twice(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().err == "ddsi shapes: a topic is named twice\n"
 
 
+def test_a_folder_without_an_identity_is_refused_before_anything_is_sent(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["shapes", "sub", "--secure", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"ddsi shapes: {tmp_path} is no keystore for a participant: it lacks identity_ca.cert.pem, ")
+
+
 def test_the_final_form_is_that_of_the_vendors_demos() -> None:
     """CDR_LE: header, length of BLUE with its NUL, the text, padding, x, y, shapesize."""
     sample = shape_form("final", None).sample("BLUE", 1, 2, 30)
@@ -106,10 +116,12 @@ def test_statuses_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     role._tell("Square", PublicationMatched(current_count=1))
     role._tell("Square", RequestedIncompatibleQos(incompatibilities=(reason,), last_publication_handle=remote))
     role._tell("Square", InconsistentTopic(remote_type_name="Image"))
+    role._tell("Square", SecurityRefused(remote=remote, reason="no rule allows it"))
     assert capsys.readouterr().err.splitlines() == [
         "ddsi shapes: Square: 1 reader matched",
         f"ddsi shapes: Square: writer {remote} does not match: reliability: offered BestEffort, requested Reliable",
         "ddsi shapes: Square: somebody uses it for another type, Image",
+        f"ddsi shapes: Square: refused {remote}: no rule allows it",
     ]
 
 
