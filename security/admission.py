@@ -34,7 +34,7 @@ from .tokens import NIL, DataHolder
 __all__ = ["AdmissionDesk"]
 
 _MAX_BANNED: Final = 1024
-_RENEWAL_PAUSE_MAX_S: Final = 60.0
+_FORGOTTEN_AFTER_S: Final = 2.0
 _SECURE: Final = BuiltinEndpoints.PARTICIPANT_SECURE_WRITER
 
 
@@ -154,20 +154,27 @@ class AdmissionDesk:
         """A message of the stateless topic."""
         if remote.handshake is None:
             return
-        if remote.handshake.is_begun_anew_by(message):
-            if remote.renewal is None:
-                if now < remote.next_renewal:
-                    return
-                remote.next_renewal = now + remote.renewal_pause_s
-                remote.renewal_pause_s = min(2 * remote.renewal_pause_s, _RENEWAL_PAUSE_MAX_S)
-                identity_token = token(remote.data.security_parameters, ParameterId.IDENTITY_TOKEN)
-                remote.renewal = self._handshake(remote, identity_token)
-                self._act(remote, remote.renewal, remote.renewal.begin(now), now)
-            self._act(remote, remote.renewal, remote.renewal.receive(message, now), now)
-            return
-        self._act(remote, remote.handshake, remote.handshake.receive(message, now), now)
+        if remote.renewal is None and remote.handshake.is_begun_anew_by(message):
+            if not self._has_forgotten_us(remote, now):
+                return
+            identity_token = token(remote.data.security_parameters, ParameterId.IDENTITY_TOKEN)
+            remote.renewal = self._handshake(remote, identity_token)
+            self._act(remote, remote.renewal, remote.renewal.begin(now), now)
         if remote.renewal is not None:
             self._act(remote, remote.renewal, remote.renewal.receive(message, now), now)
+        if not remote.handshake.is_begun_anew_by(message):
+            self._act(remote, remote.handshake, remote.handshake.receive(message, now), now)
+
+    @staticmethod
+    def _has_forgotten_us(remote: RemoteParticipant, now: float) -> bool:
+        """Somebody says so in its name.  It is not so while anything comes that only its keys can have made.
+
+        Who believed at once could be made to tear apart, as often as a stranger likes, what is matched and in use.  Who
+        has really forgotten asks again and again.
+        """
+        if remote.renewal_asked is None or remote.renewal_asked[1] != remote.opened:
+            remote.renewal_asked = (now, remote.opened)
+        return now - remote.renewal_asked[0] >= _FORGOTTEN_AFTER_S
 
     def computed(self, effect: Compute, result: object, now: float) -> None:
         _, proceed = self._jobs.pop(effect.generation, (None, None))
@@ -251,17 +258,22 @@ class AdmissionDesk:
             token(remote.data.security_parameters, ParameterId.PERMISSIONS_TOKEN),
             authentication.get_authenticated_peer_credential_token(handle),
         )
-        self._permitted(remote, handshake, shared_secret, result)
+        self._permitted(remote, handshake, shared_secret, result, now)
 
     def _permitted(
-        self, remote: RemoteParticipant, handshake: Handshake, shared_secret: SharedSecretHandle, result: object
+        self,
+        remote: RemoteParticipant,
+        handshake: Handshake,
+        shared_secret: SharedSecretHandle,
+        result: object,
+        now: float,
     ) -> None:
         if handshake not in (remote.handshake, remote.renewal):
             return
         match result:
             case Pending(job):
                 self._compute(
-                    remote, job, lambda result, _now: self._permitted(remote, handshake, shared_secret, result)
+                    remote, job, lambda result, now: self._permitted(remote, handshake, shared_secret, result, now)
                 )
             case Refused(reason):
                 self._refuse(remote, reason)
@@ -272,7 +284,7 @@ class AdmissionDesk:
                 if refusal is not None:
                     self._refuse(remote, refusal.reason)
                 else:
-                    self._admit(remote, handshake, shared_secret, result)
+                    self._admit(remote, handshake, shared_secret, result, now)
 
     def _admit(
         self,
@@ -280,6 +292,7 @@ class AdmissionDesk:
         handshake: Handshake,
         shared_secret: SharedSecretHandle,
         permissions: PermissionsHandle,
+        now: float,
     ) -> None:
         assert handshake.remote_identity is not None
         crypto = self._plugins.cryptographic.register_matched_remote_participant(
@@ -287,22 +300,23 @@ class AdmissionDesk:
         )
         subject = self._plugins.authentication.get_subject_name(handshake.remote_identity)
         if remote.standing is Standing.ADMITTED:
+            self._keys.forget(remote)
             self._return_credentials(remote)
+            remote.renewal_asked = None
             if handshake is remote.renewal:
                 if remote.handshake is not None:
                     remote.handshake.close()
                 remote.handshake, remote.renewal = handshake, None
-            remote.permissions = permissions
-            # The core is not told unless the peer turns out to have started again (KeyExchange.renew): anybody can ask
-            # for a renewal in a peer's name, and must not be able to tear its endpoints apart by that.
-            self._keys.renew(remote, crypto, shared_secret)
             self._log(LogLevel.NOTICE_LEVEL, f"{remote.guid}, {subject}, authenticated anew", "authenticated")
         else:
-            remote.crypto, remote.shared_secret, remote.permissions = crypto, shared_secret, permissions
-            remote.standing, remote.reason = Standing.ADMITTED, ""
             self._log(LogLevel.INFO_LEVEL, f"participant {remote.guid} is {subject}, authenticated", "authenticated")
-            self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
+        remote.crypto, remote.shared_secret, remote.permissions = crypto, shared_secret, permissions
+        if remote.standing is Standing.ADMITTED:
+            volatile = [endpoint for endpoint in self._own.endpoints.values() if endpoint.is_volatile]
+            self._keys.begin_anew(remote, volatile, now)
+        remote.standing, remote.reason = Standing.ADMITTED, ""
         self._changed()
+        self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
 
     def _refuse(self, remote: RemoteParticipant, reason: str) -> None:
         """It may not join, or not any longer; and it will not be asked again under this Guid."""

@@ -16,8 +16,7 @@ Only what a peer wrote under the key that the two share is looked at here, and i
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -30,8 +29,8 @@ from .generic_message import (
     PARTICIPANT_CRYPTO_TOKENS,
     GenericMessage,
 )
-from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle, SharedSecretHandle
-from .local_endpoint import LocalEndpoint
+from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
+from .local_endpoint import VOLATILE, LocalEndpoint
 from .plugins import Cryptographic
 from .remote_participant import RemoteParticipant
 from .tokens import CryptoToken
@@ -59,7 +58,6 @@ class Pair:
     participant: RemoteParticipant
     handle: CryptoHandle | None
     awaits_key: bool
-    relay_only: bool = False
     is_open: bool = False
 
 
@@ -78,8 +76,7 @@ class Outbox(Protocol):
 
 
 class KeyExchange:
-    """For one participant of ours.  ``decide(local, remote, admission)`` is called when a waiting pair is complete,
-    ``restarted(participant)`` for one that authenticated anew and has other keys than before."""
+    """For one participant of ours.  ``decide(local, remote, admission)`` is called when a waiting pair is complete."""
 
     def __init__(
         self,
@@ -89,14 +86,12 @@ class KeyExchange:
         is_rtps_protected: bool,
         outbox: Outbox,
         decide: Callable[[Guid, Guid, Admission], None],
-        restarted: Callable[[RemoteParticipant], None],
     ) -> None:
         self._cryptographic = cryptographic
         self._local_participant = local_participant
         self._is_rtps_protected = is_rtps_protected
         self._outbox = outbox
         self._decide = decide
-        self._restarted = restarted
         self.pairs: dict[tuple[Guid, Guid], Pair] = {}
         self.by_remote: dict[bytes, list[Pair]] = {}
         """The pairs of each remote endpoint, by its 16 octets."""
@@ -147,25 +142,13 @@ class KeyExchange:
             participant.crypto = None
         participant.has_keys = False
 
-    def renew(
-        self, participant: RemoteParticipant, crypto: ParticipantCryptoHandle, shared_secret: SharedSecretHandle
-    ) -> None:
-        """The peer authenticated anew: it has none of our keys any more, and perhaps others of its own.
-
-        What was matched stays so; until the peer's keys have come again, nothing of it can be read.  If then its
-        participant key is another one, it is another process: what was matched is void.
-        """
-        participant.is_renewed = True
-        former = [pair for pair in self.pairs.values() if pair.participant is participant]
-        self.forget(participant)
-        participant.crypto, participant.shared_secret = crypto, shared_secret
-        for pair in former:
-            again = self._register(pair.local, pair.remote, participant, relay_only=pair.relay_only)
-            again.is_open = pair.is_open
+    def begin_anew(self, participant: RemoteParticipant, volatile: Iterable[LocalEndpoint], now: float) -> None:
+        """It authenticated anew, as it has lost what it knew of us.  The topic that carries keys begins by itself."""
+        for local in volatile:
+            remote = Guid.of(participant.guid.prefix, VOLATILE[local.guid.entity_id])
+            self.match(local, remote, participant, now, relay_only=False)
+            self._decide(local.guid, remote, ADMITTED)
         self.send_participant_keys(participant)
-        for pair in former:
-            if not pair.local.is_volatile:
-                self._send_keys(self.pairs[(pair.local.guid, pair.remote)])
 
     def _register(
         self, local: LocalEndpoint, remote: Guid, participant: RemoteParticipant, *, relay_only: bool
@@ -183,7 +166,7 @@ class KeyExchange:
                     local.handle, participant.crypto, participant.shared_secret
                 )
                 awaits_key = attributes.is_submessage_protected or attributes.is_payload_protected
-        pair = Pair(local, remote, participant, handle, awaits_key and not local.is_volatile, relay_only)
+        pair = Pair(local, remote, participant, handle, awaits_key and not local.is_volatile)
         self.pairs[(local.guid, remote)] = pair
         self.by_remote.setdefault(bytes(remote), []).append(pair)
         if handle is not None:
@@ -261,11 +244,6 @@ class KeyExchange:
         )
         if refusal is not None:
             return refusal
-        before, participant.keys_digest = participant.keys_digest, _digest(message)
-        if participant.is_renewed:
-            participant.is_renewed = False
-            if before and before != participant.keys_digest:
-                self._restarted(participant)
         if not participant.has_keys:
             participant.has_keys = True
             for pair in list(self.pairs.values()):
@@ -305,10 +283,3 @@ class KeyExchange:
         message, expiry = pair.participant.early.pop((pair.local.guid, pair.remote), (None, 0.0))
         if message is not None and now < expiry:
             self._endpoint_keys(pair, message)
-
-
-def _digest(message: GenericMessage) -> bytes:
-    """To recognise keys without keeping them."""
-    return hashlib.sha256(
-        b"".join(octets for token in message.message_data for _, octets in token.binary_properties)
-    ).digest()

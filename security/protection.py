@@ -156,7 +156,10 @@ class Protection:
         remote = self._remotes.get(source)
         if remote is None or remote.crypto is None:
             return _no_keys(message, 20)
-        return self._cryptographic.decode_rtps_message(message, self._local_participant, remote.crypto)
+        plain = self._cryptographic.decode_rtps_message(message, self._local_participant, remote.crypto)
+        if not isinstance(plain, Outcome):
+            remote.opened += 1
+        return plain
 
     def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
         remote = self._remotes.get(source)
@@ -174,7 +177,10 @@ class Protection:
         if pair is None:
             return NOT_FOR_US
         plain = self._decode(protected, pair)
-        if isinstance(plain, Outcome) or self._speaks_for_itself(plain, pair):
+        if isinstance(plain, Outcome):
+            return plain
+        remote.opened += 1
+        if self._speaks_for_itself(plain, pair):
             return plain
         return Rejected(f"it was protected by {pair.remote}, and speaks for another")
 

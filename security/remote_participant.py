@@ -26,11 +26,10 @@ class Standing(Enum):
 
 @dataclass(slots=True)
 class RemoteParticipant:
-    """``renewal``: another handshake, that will take the first one's place: the peer has lost what it knew of us.
-    Whoever says so cannot prove it, so the next one is not begun before ``next_renewal``, in engine seconds.
+    """``opened`` counts what was opened with its keys.
 
-    ``keys_digest``: of the peer's participant key; after a renewal (``is_renewed``) another one shows that it has
-    started again under the same Guid.
+    ``renewal``: another handshake, that will take the first one's place, as the peer has lost what it knew of us.  Who
+    says so in its name cannot prove it: ``renewal_asked`` is when that was said first, and what ``opened`` was then.
 
     ``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first.
     """
@@ -40,14 +39,12 @@ class RemoteParticipant:
     reason: str = ""
     handshake: Handshake | None = None
     renewal: Handshake | None = None
-    next_renewal: float = 0.0
-    renewal_pause_s: float = 1.0
+    renewal_asked: tuple[float, int] | None = None
     permissions: PermissionsHandle | None = None
     shared_secret: SharedSecretHandle | None = None
     crypto: ParticipantCryptoHandle | None = None
     has_keys: bool = False
-    keys_digest: bytes = b""
-    is_renewed: bool = False
+    opened: int = 0
     early: dict[tuple[Guid, Guid], tuple[GenericMessage, float]] = field(default_factory=dict)
 
     @property

@@ -35,6 +35,7 @@ from ddsi.structure.qos_policies import Properties
 
 from .admission import AdmissionDesk
 from .announced import endpoint_info, endpoint_refusal, info
+from .handshake import State
 from .key_exchange import KeyExchange
 from .loading import Plugins, load_plugins
 from .local_endpoint import LocalEndpoint
@@ -78,7 +79,6 @@ class SecurityService:
             is_rtps_protected=own.attributes.is_rtps_protected,
             outbox=self._mailbox.post_keys,
             decide=lambda local, remote, admission: self._effects.append(Decided(local, remote, admission)),
-            restarted=lambda remote: self._effects.append(Decided(own.guid, remote.guid, ADMITTED)),
         )
         protection = self._protection = Protection(
             plugins.cryptographic, own.crypto, own.attributes, own.endpoints, self._remotes, self._keys
@@ -252,6 +252,11 @@ class SecurityService:
             until = (min(wall) - self._wall_clock()) / 1e9
             self._wall_due = self._now + min(max(until, 0.0), _WALL_CLOCK_CHECK_S)
         self._deadline = min(self._wall_due, self._desk.next_deadline())
+
+    def handshake_state(self, remote: GuidPrefix) -> State | None:
+        """Where the handshake with this peer stands, for those who show it; None where there is none."""
+        participant = self._remotes.get(remote)
+        return None if participant is None or participant.handshake is None else participant.handshake.state
 
     # --- octets: bound to Protection once there is a participant -------------------------------------------
 
