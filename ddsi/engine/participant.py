@@ -196,7 +196,8 @@ class Participant:
     def drain_effects(self) -> list[Effect]:
         """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
         self.flush()
-        self._act_on_hook_effects()
+        if not self._is_closed:
+            self._act_on_hook_effects()
         if not self._effects:
             return []
         effects = list(self._effects)

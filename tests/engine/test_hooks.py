@@ -295,6 +295,14 @@ def test_the_hooks_have_their_deadline() -> None:
     assert hooks.asked.count("handle_timeout") == 1
 
 
+def test_who_has_said_goodbye_says_nothing_more() -> None:
+    domain, sender, listeners, hooks = _messenger()
+    sender.engine.close(domain.now)
+    sender.engine.drain_effects()
+    hooks.effects.append(_message(sender, listeners[0], b"too late"))
+    assert sender.engine.drain_effects() == []
+
+
 # --- transform ------------------------------------------------------------------------------------------------------
 
 
