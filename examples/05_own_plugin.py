@@ -4,8 +4,8 @@ The plugin is the class AllowList below.  It keeps what the builtin plugin does,
 each peer shows.  A participant chooses it by the property `dds.sec.auth.plugin`; the list is another property, which
 only this plugin knows.  The other plugins stay the builtin ones.  docs/security.md says what a plugin must be.
 
-No participants run here yet: the two sides of each handshake are driven directly, as the security service does it.  The
-certificates are made on the spot.
+No participants run here: the two sides of each handshake are driven directly, as the security service of a participant
+does it, so that every step can be seen.  The certificates are made on the spot.
 
 You will see alice, who has the list, and bob agree on a secret; then mallory refused although his certificate is good;
 and bob, who has no list and uses the builtin plugin, admit him; last, what you are told if you misspell the plugin.

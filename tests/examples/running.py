@@ -26,11 +26,12 @@ def environment() -> dict[str, str]:
     return {**os.environ, "DDSI_URI": uri, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
 
 
-def output_of(program: Path, *arguments: str) -> list[str]:
-    """The lines that the program prints.  It must end by itself, quietly, with status 0."""
+def output_of(program: Path, *arguments: str, folder: Path | None = None) -> list[str]:
+    """The lines that the program prints, run in ``folder``.  It must end by itself, quietly, with status 0."""
     done = subprocess.run(
         [sys.executable, str(program), *arguments],
         env=environment(),
+        cwd=folder,
         capture_output=True,
         text=True,
         encoding="utf-8",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -58,10 +59,11 @@ def test_late_joiner() -> None:
 
 
 @contextmanager
-def in_background(name: str, role: str, env: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(
-        [sys.executable, str(EXAMPLES / name), role], env=env, stdout=subprocess.PIPE, text=True, encoding="utf-8"
-    )
+def in_background(
+    name: str, role: str, env: dict[str, str], folder: Path | None = None
+) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, str(EXAMPLES / name), role]
+    process = subprocess.Popen(command, env=env, cwd=folder, stdout=subprocess.PIPE, text=True, encoding="utf-8")
     with process:
         try:
             yield process
@@ -69,9 +71,11 @@ def in_background(name: str, role: str, env: dict[str, str]) -> Iterator[subproc
             process.kill()
 
 
-def other_role(name: str, role: str, env: dict[str, str]) -> list[str]:
+def other_role(name: str, role: str, env: dict[str, str], folder: Path | None = None) -> list[str]:
     command = [sys.executable, str(EXAMPLES / name), role]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, encoding="utf-8", timeout=30, check=True)
+    done = subprocess.run(
+        command, env=env, cwd=folder, capture_output=True, text=True, encoding="utf-8", timeout=30, check=True
+    )
     return done.stdout.splitlines()
 
 
@@ -126,3 +130,59 @@ def test_own_plugin_refuses_whom_the_builtin_one_admits() -> None:
         "bob and mallory:   authenticated, and both hold one secret",
     ]
     assert misspelt.endswith(" is '__main__:AlowList': __main__ has no AlowList: did you mean AllowList?")
+
+
+SECURED = EXAMPLES / "06_secured.py"
+TEMPERATURES = [f"bob received {celsius:.1f} of the cellar" for celsius in (11.0, 11.5, 12.0)]
+
+
+@pytest.fixture(scope="module")
+def keystore(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder where the two commands that the example names were run."""
+    pytest.importorskip("cryptography")
+    folder = tmp_path_factory.mktemp("secured")
+    commands = re.findall(r"^    ddsi (keystore .*)$", SECURED.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(commands) == 2
+    for words in commands:
+        subprocess.run(
+            [sys.executable, "-m", "ddsi.cli", *shlex.split(words)],
+            env=environment(),
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            timeout=30,
+            check=True,
+        )
+    return folder
+
+
+def assert_bob_is_told(lines: list[str]) -> None:
+    (told,) = lines
+    assert re.fullmatch(
+        r"bob may not publish: .*permissions\.p7s, grant 'bob' \(line \d+\): .* Missing right: publish 'Temperatures'",
+        told,
+    )
+
+
+def test_secured(keystore: Path) -> None:
+    *received, told = output_of(SECURED, folder=keystore)
+    assert received == TEMPERATURES
+    assert_bob_is_told([told])
+
+
+def test_secured_in_two_processes(keystore: Path) -> None:
+    env = environment()
+    with in_background(SECURED.name, "subscribe", env, keystore) as subscriber:
+        assert other_role(SECURED.name, "publish", env, keystore) == []
+        output, _ = subscriber.communicate(timeout=30)
+    assert output.splitlines() == TEMPERATURES
+    assert_bob_is_told(output_of(SECURED, "intrude", folder=keystore))
+
+
+def test_secured_tells_how_to_make_the_keystore_that_it_misses(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, str(SECURED)], env=environment(), cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    told = [line for line in done.stderr.splitlines() if line.startswith("    ddsi keystore ")]
+    assert len(told) == 2
+    assert all(line in (ast.get_docstring(ast.parse(SECURED.read_text(encoding="utf-8"))) or "") for line in told)
