@@ -502,7 +502,7 @@ class Inbound:
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
         _check_number(heartbeat.last_sn, raw)
-        restarted: list[tuple[LocalReader, WriterProxy]] = []
+        restarted = False
         pairs = self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id)
         for local, proxy in pairs:
             due = proxy.schedule.due
@@ -513,25 +513,14 @@ class Inbound:
                 self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
             if proxy.schedule.due != due:
                 self._engine.proxy_touched(local.behavior, proxy)
-            if proxy.contradictions >= _CONTRADICTIONS_OF_A_RESTART:
-                restarted.append((local, proxy))
+            restarted = restarted or proxy.contradictions >= _CONTRADICTIONS_OF_A_RESTART
         self._forget_settled(incoming, heartbeat.writer_id)
-        if restarted:
-            self._restarted(incoming, restarted)
+        # A participant that may not say in clear that it changed does not begin anew by its numbers: HEARTBEATs of the
+        # past can be sent again by anybody, protected as they are.  Such a one has to authenticate anew.
+        if restarted and self._hooks.admits(incoming.prefix + SPDP_WRITER, incoming.protection):
+            self._engine.discovery.participant_restarted(incoming)
         if heartbeat.liveliness and pairs:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
-
-    def _restarted(self, incoming: Incoming, pairs: list[tuple[LocalReader, WriterProxy]]) -> None:
-        """A writer counts anew, so its participant has begun anew.
-
-        But one that may not say in clear that it changed may not seem in clear to have begun anew either: then this
-        writer alone is believed, or whoever speaks in its name, to whom its numbers are open anyhow.
-        """
-        if self._hooks.admits(incoming.prefix + SPDP_WRITER, incoming.protection):
-            self._engine.discovery.participant_restarted(incoming)
-            return
-        for local, proxy in pairs:
-            self._engine.matchmaker.writer_restarted(local, proxy, incoming.now)
 
     def _heartbeat_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         """RTPS 2.5 §8.3.8.7: ask at once for fragments that should be here.  Ignored for samples of which none is."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from ..behavior.defrag import Defragmenter, Keep
 from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.stateless_reader import StatelessReader
-from ..behavior.writer_proxy import WriterProxy
 from ..discovery.matching import MatchRefusal, RefusalKind, judge
 from ..discovery.participant_proxy import ParticipantProxy
 from ..spi import PENDING, Admission, Refused
@@ -214,14 +213,6 @@ class Matchmaker:
         remote.readers.append((reader.behavior, proxy))
         remote.readers_changed()
         engine.proxy_touched(reader.behavior, proxy)
-
-    def writer_restarted(self, reader: LocalReader, proxy: WriterProxy, now: float) -> None:
-        """The writer counts anew, and so does this pair; the application hears nothing of it."""
-        engine = self._engine
-        self.detach_writer(reader, proxy.guid, now)
-        self.attach_writer(reader, proxy.data, engine.participants.get(proxy.guid.prefix), proxy.locators, now)
-        reader.behavior.writers[proxy.guid].is_alive = proxy.is_alive
-        engine.liveliness.remote_writer_matched(proxy.data, now)
 
     def _match_local(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
         engine = self._engine
