@@ -1,7 +1,8 @@
 """``python -m multiproc_tests.interop``: every case with every pair of peers; writes ``docs/interop/``.
 
 ``--ours`` leaves out the pairs of which neither is ours, ``--case`` and ``--peer`` choose; a run that chooses prints
-its results and writes nothing.  The exit status is the number of unexpected failures, at most 100.
+its results, and writes them where ``--output`` says.  The exit status is the number of unexpected failures, at most
+100.
 """
 
 from __future__ import annotations
@@ -34,9 +35,10 @@ def main(words: Sequence[str] | None = None) -> int:
     for peer in peers:
         _announce(peer)
     outcomes = trio.run(_run_all, cases, pairs, arguments)
-    if not (arguments.peer or arguments.case or arguments.ours):
-        write_report(outcomes, peers, arguments.output)
-        print(f"written: {arguments.output}/results.md and results.json")
+    if arguments.output is not None or not (arguments.peer or arguments.case or arguments.ours):
+        folder = arguments.output or RESULTS
+        write_report([outcome for outcome in outcomes if outcome.verdict is not Verdict.NOT_APPLICABLE], peers, folder)
+        print(f"written: {folder}")
     failures = [outcome for outcome in outcomes if outcome.verdict is Verdict.FAILED]
     for outcome in failures:
         print(f"\n{outcome.case}, {outcome.publisher} to {outcome.subscriber}: {outcome.reason}\n{outcome.transcript}")
@@ -69,7 +71,7 @@ def _parse(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--peer", action="append", default=[], metavar="NAME", help="only between these peers")
     parser.add_argument("--ours", action="store_true", help="only pairs with ours in them")
     parser.add_argument("--jobs", type=int, default=2, help="cases played at a time (default: 2)")
-    parser.add_argument("--output", type=Path, default=RESULTS, help="folder of the results")
+    parser.add_argument("--output", type=Path, help="folder of the results (default: docs/interop, for a whole run)")
     parser.add_argument("--captures", type=Path, metavar="FOLDER", help="keep a capture of each case there")
     parser.add_argument("-v", "--verbose", action="store_true", help="the transcripts of known limits too")
     return parser.parse_args(words)

@@ -41,7 +41,7 @@ async def test_interop(case: Case, publisher: Peer, subscriber: Peer) -> None:
     A case with a foreign peer is played once more when it fails: how others take a late scheduler is not ours to judge.
     Ours with ours has one chance.
     """
-    limit = known_limit(case.name, publisher.name, subscriber.name)
+    limit = known_limit(case, publisher.name, subscriber.name)
     try:
         await play(case, publisher, subscriber)
     except Unavailable:

@@ -36,6 +36,8 @@ class Case:
     """Part of every test run, with each peer in both roles; the others run on request."""
     quick_pairs: frozenset[tuple[str, str]] = frozenset()
     """Part of every test run with these publishers and subscribers only."""
+    is_ours: bool = False
+    """Not for the others among themselves."""
     keystore: Callable[[], Path] | None = None
     """The folder that the options' keystores are in; made when it is first asked for."""
     evidence: Callable[[Capture], Sequence[str]] | None = None

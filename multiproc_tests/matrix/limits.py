@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .cases import Case
+from .secured_limits import secured_limit
+
 __all__ = ["known_limit"]
 
 CYCLONES = frozenset({"cyclone", "cyclone11"})
@@ -86,9 +89,11 @@ _LIMITS = (
 )
 
 
-def known_limit(case: str, publisher: str, subscriber: str) -> str | None:
+def known_limit(case: Case, publisher: str, subscriber: str) -> str | None:
     """Why this combination is expected to fail, or None."""
+    if case.keystore is not None:
+        return secured_limit(case, publisher, subscriber)
     for limit in _LIMITS:
-        if case in limit.cases and publisher in limit.publishers and subscriber in limit.subscribers:
+        if case.name in limit.cases and publisher in limit.publishers and subscriber in limit.subscribers:
             return limit.reason
     return None

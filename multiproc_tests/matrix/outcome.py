@@ -21,6 +21,7 @@ from ..framework import (
     relayed_namespaces,
     scenario,
 )
+from ..peers.catalogue import OURS
 from ..peers.peer import Peer
 from .cases import Case
 from .limits import known_limit
@@ -57,6 +58,8 @@ class Outcome:
 
 def missing_ability(case: Case, *peers: Peer) -> str | None:
     """Why these peers cannot play the case, or None if they can."""
+    if case.is_ours and not any(peer is OURS for peer in peers):
+        return "it is about ours"
     for peer in peers:
         missing = sorted(need.value for need in case.needs - peer.abilities)
         if missing:
@@ -125,7 +128,7 @@ async def run_case(case: Case, publisher: Peer, subscriber: Peer, *, captures: P
     except (ExpectationFailed, DeadlineExceeded) as error:
         seconds = time.monotonic() - began
         transcript = "\n".join(getattr(error, "__notes__", []))
-        if known := known_limit(*who):
+        if known := known_limit(case, publisher.name, subscriber.name):
             return Outcome(*who, Verdict.KNOWN, seconds, known, transcript)
         return Outcome(*who, Verdict.FAILED, seconds, str(error), transcript)
     return Outcome(*who, Verdict.PASSED, time.monotonic() - began)

@@ -184,6 +184,7 @@ def _refusal_cases() -> Iterator[Case]:
                 needs=frozenset({Ability.SECURITY}),
                 publisher=publisher,
                 subscriber=subscriber,
+                is_ours=True,
                 keystore=faulty_keystore,
                 # In turn with each, so that ours is the good and the faulty one.
                 quick_pairs=frozenset({_DIRECTIONS[(number % 2) * 2 + is_reversed]}),

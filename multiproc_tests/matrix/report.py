@@ -9,8 +9,10 @@ from pathlib import Path
 
 from ..peers.catalogue import OURS
 from ..peers.peer import Peer
-from .cases import CASES
+from .cases import CASES, Case
 from .outcome import Outcome, Verdict
+from .refusals import REFUSAL_CASES
+from .secured import SECURED_CASES
 
 __all__ = ["write_report"]
 
@@ -31,13 +33,40 @@ of its own. Columns are *publisher to subscriber*. An empty cell: one of the two
 """
 
 
+SECURED_INTRODUCTION = """\
+# Secured interoperability, as run
+
+Written by `python -m multiproc_tests.interop` (`make interop`). Columns are *publisher to subscriber*. The publisher
+of a case is alice, whose GUID is the lower one and who begins the handshake; in a case called *reversed* the subscriber
+is. **yes** means that every sample arrived and was acknowledged, and that a capture of the run shows what the
+governance asks for: the kinds of transformation that it names at each level, a MAC for each receiver where the origin
+is authenticated, nothing of users' endpoints and of discovery in clear that should not be, and no sample that could be
+read where anything encrypts it. In the cases called *refused*, **yes** means that nothing arrived and that each side
+said why, where it has words for it. **no** is a failure; a plain no is a limit of an implementation of others, and is
+explained below.
+"""
+
+
 def write_report(outcomes: Sequence[Outcome], peers: Sequence[Peer], folder: Path) -> None:
-    """Writes ``results.md`` and ``results.json`` into the folder, which is made if need be."""
+    """Writes ``results`` and ``secured``, each as ``.md`` and ``.json``, into the folder, which is made if need be.
+
+    Of which cases there are no outcomes, nothing is written.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    versions = {peer.name: {"title": peer.title, "version": peer.version()} for peer in peers}
-    document = {"peers": versions, "outcomes": [_as_json(outcome) for outcome in outcomes]}
-    Path(folder, "results.json").write_text(json.dumps(document, indent=1) + "\n")
-    Path(folder, "results.md").write_text("\n".join(_markdown(outcomes, peers)) + "\n")
+    for name, introduction, cases in (
+        ("results", INTRODUCTION, CASES),
+        ("secured", SECURED_INTRODUCTION, (*SECURED_CASES, *REFUSAL_CASES)),
+    ):
+        names = {case.name for case in cases}
+        chosen = [outcome for outcome in outcomes if outcome.case in names]
+        present = {peer for outcome in chosen for peer in (outcome.publisher, outcome.subscriber)}
+        who = [peer for peer in peers if peer.name in present]
+        if chosen:
+            versions = {peer.name: {"title": peer.title, "version": peer.version()} for peer in who}
+            document = {"peers": versions, "outcomes": [_as_json(outcome) for outcome in chosen]}
+            Path(folder, f"{name}.json").write_text(json.dumps(document, indent=1) + "\n")
+            lines = _markdown(introduction, cases, chosen, who)
+            Path(folder, f"{name}.md").write_text("\n".join(lines) + "\n")
 
 
 def _as_json(outcome: Outcome) -> dict[str, object]:
@@ -46,17 +75,20 @@ def _as_json(outcome: Outcome) -> dict[str, object]:
     return {**document, "verdict": outcome.verdict.value, "seconds": round(outcome.seconds, 1)}
 
 
-def _markdown(outcomes: Sequence[Outcome], peers: Sequence[Peer]) -> Iterable[str]:
-    yield INTRODUCTION
+def _markdown(
+    introduction: str, cases: Sequence[Case], outcomes: Sequence[Outcome], peers: Sequence[Peer]
+) -> Iterable[str]:
+    yield introduction
     yield "| name | implementation | version |\n|---|---|---|"
     yield from (f"| {peer.name} | {peer.title} | {peer.version()} |" for peer in peers)
     pairs = list(dict.fromkeys((outcome.publisher, outcome.subscriber) for outcome in outcomes))
     yield "\n## Ours with everybody\n"
     yield from _table(outcomes, [pair for pair in pairs if OURS.name in pair])
-    yield "\n## The others among themselves\n"
-    yield from _table(outcomes, [pair for pair in pairs if OURS.name not in pair])
+    if foreign := [pair for pair in pairs if OURS.name not in pair]:
+        yield "\n## The others among themselves\n"
+        yield from _table(outcomes, foreign)
     yield "\n## The cases\n"
-    yield from (f"- **{case.name}**: {case.claim}." for case in CASES)
+    yield from (f"- **{case.name}**: {case.claim}." for case in cases if not case.name.endswith("-reversed"))
     yield from _reasons("What failed", outcomes, Verdict.FAILED)
     yield from _reasons("Known limits of the others", outcomes, Verdict.KNOWN)
 
@@ -66,7 +98,9 @@ def _table(outcomes: Sequence[Outcome], pairs: Sequence[tuple[str, str]]) -> Ite
     yield "| case | " + " | ".join(f"{publisher} to {subscriber}" for publisher, subscriber in pairs) + " |"
     yield "|---" * (len(pairs) + 1) + "|"
     for case in dict.fromkeys(outcome.case for outcome in outcomes):
-        yield f"| {case} | " + " | ".join(MARKS[by_place[case, *pair].verdict] for pair in pairs) + " |"
+        marks = [by_place.get((case, *pair)) for pair in pairs]
+        if any(outcome is not None for outcome in marks):
+            yield f"| {case} | " + " | ".join(MARKS[outcome.verdict] if outcome else "" for outcome in marks) + " |"
 
 
 def _reasons(heading: str, outcomes: Sequence[Outcome], verdict: Verdict) -> Iterable[str]:

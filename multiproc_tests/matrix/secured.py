@@ -171,7 +171,7 @@ def _meeting_cases() -> Iterator[Case]:
         yield _case(
             "storm", "all samples arrive though a tenth of all packets is lost both ways", deliver, "encrypt-all",
             options=replace(SHAPES, count=30, wait_s=40), weather=STORM, is_reversed=is_reversed,
-            quick=(_DIRECTIONS[1 + is_reversed],),
+            quick=(_DIRECTIONS[2 * is_reversed],),
         )  # fmt: skip
     yield _case(
         "storm-fragments", "the same with samples of 40 KiB", deliver, "metadata-data", weather=STORM, gate=True,
