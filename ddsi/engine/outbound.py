@@ -47,11 +47,15 @@ _KEY_HASH_OCTETS = 16
 # RTPS header, INFO_DST, INFO_TS, the head of a DATA_FRAG, a HEARTBEAT: what travels with a fragment.
 _FRAGMENT_COMPANY = 20 + 16 + 12 + 36 + 32
 _LARGEST_FRAGMENT = 65_000  # fragmentSize is a uint16, and a datagram ends at 65,507
+# With so many receivers that their MACs fill a message, a larger message is the lesser evil than nothing but MACs.
+_LEAST_FRAGMENT = 512
 
 
 def fragment_octets_for(max_message_octets: int, configured: int | None, added: Overhead) -> int:
     """The fragment size: as configured, else what fills a message beside its company and what protection adds."""
-    room = max_message_octets - _FRAGMENT_COMPANY - added.payload - added.submessage - added.message
+    unprotected = max_message_octets - _FRAGMENT_COMPANY
+    room = unprotected - added.payload - added.submessage - added.message
+    room = max(room, min(unprotected, _LEAST_FRAGMENT))
     return max(min(configured or room, room, _LARGEST_FRAGMENT) & ~7, 8)
 
 

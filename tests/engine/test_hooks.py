@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION
+from ddsi.engine.outbound import fragment_octets_for
 from ddsi.simulation import Domain, Node
 from ddsi.spi import (
     ADMITTED,
@@ -521,6 +522,15 @@ def test_messages_and_fragments_leave_room_for_what_each_receiver_adds(receivers
     assert domain.run_until(lambda: all(len(reader.taken) == 56 for reader in readers), 5)
     sizes = [len(octets) for sender, octets in seen if sender == a.guid.prefix]
     assert 1300 < max(sizes) <= 1452
+
+
+def test_where_macs_would_fill_messages_they_become_larger_and_fragments_not_tiny() -> None:
+    """A hundred receivers with a MAC each at both levels: 4000 octets."""
+    assert fragment_octets_for(1452, None, Overhead(submessage=2000, message=2000)) == 512
+    assert fragment_octets_for(1452, None, Overhead(submessage=100, message=100)) == 1136
+    assert fragment_octets_for(1452, 100, Overhead(submessage=2000)) == 96
+    assert fragment_octets_for(500, None, Overhead(submessage=2000)) == 384, "as much as without protection"
+    assert fragment_octets_for(65_507, None, Overhead()) == 65_000
 
 
 def test_fragments_of_one_sample_keep_their_size_when_receivers_come() -> None:
