@@ -80,7 +80,8 @@ class SubjectName:
         return cls(tuple(sorted(found)), text.lstrip(_SPACE) if stripped.endswith("\\") else stripped)
 
     def __str__(self) -> str:
-        return self.text
+        """For people: what does not print is escaped."""
+        return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in self.text)
 
 
 def _malformed(reason: str) -> MalformedMessage:

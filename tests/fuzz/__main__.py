@@ -36,7 +36,7 @@ def fuzz(name: str, seconds: int) -> None:
     words = folder.with_suffix(".words")
     words.write_text("".join(f'"{word}"\n' for word in _words(target)))
     options = [
-        f"-dict={words}",
+        *([f"-dict={words}"] if target.is_text else []),
         f"-max_total_time={seconds}",
         f"-max_len={target.most_octets}",
         f"-timeout={SECONDS_FOR_ONE_INPUT}",
@@ -55,8 +55,6 @@ def fuzz(name: str, seconds: int) -> None:
 
 def _words(target: Target) -> list[str]:
     """Those of its seeds, and tags."""
-    if not target.is_text:
-        return []
     text = b"\n".join(target.seeds()).decode("latin-1")
     return sorted(set(re.findall(r"</?[a-z_]+>|[A-Za-z][A-Za-z_/-]{2,40}", text)))
 

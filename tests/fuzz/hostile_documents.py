@@ -244,6 +244,7 @@ def permissions() -> Iterator[Made]:
         ("empty", b"", f"{DOCUMENT} ~ subject_name"),
         ("of-2000-attributes", b",".join([b"CN=alice"] * 2000), f"{DOCUMENT} ~ characters"),
         ("with-a-nul-escape", b"CN=alice\\00,O=Peers", "Refused ~ subject"),
+        ("of-control-characters", b"CN=alice,O=Peers,OU=\xc2\x9b31m\xe2\x80\xae", "Refused ~ subject"),
         ("of-one-attribute-more", b"CN=alice,O=Peers,OU=x", "Refused ~ subject"),
         ("of-one-attribute-less", b"CN=alice", "Refused ~ subject"),
         ("of-alike-letters", "CN=аlice,O=Peers".encode(), "Refused ~ subject"),
