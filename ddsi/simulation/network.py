@@ -48,6 +48,7 @@ class Network:
 
     ``delivered``, ``sent`` and ``dropped`` (by reason) count datagrams; one that is sent to several destinations, or
     to a group of several members, counts once for each.  ``watch`` is shown every message that is sent, once.
+    ``loses`` is asked of every datagram on its way from one participant to another, and may take it away.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class Network:
         self.delivered = 0
         self.dropped: Counter[str] = Counter()
         self.watch: Callable[[GuidPrefix, bytes], None] | None = None
+        self.loses: Callable[[GuidPrefix, GuidPrefix, bytes], bool] = lambda sender, receiver, octets: False
         self._dice = dice
         self._trace = trace
         self._events: list[tuple[float, int, Callable[[], None]]] = []
@@ -148,7 +150,7 @@ class Network:
             self._drop(source, destination, target, octets, "partition")
         elif len(octets) > link.mtu:
             self._drop(source, destination, target, octets, "mtu")
-        elif self._dice.chance(link.loss):
+        elif self._dice.chance(link.loss) or self.loses(source.owner, target.owner, octets):
             self._drop(source, destination, target, octets, "loss")
         else:
             copies = 2 if self._dice.chance(link.duplication) else 1

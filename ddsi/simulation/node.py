@@ -129,6 +129,7 @@ class Node:
             trace=self._trace,
         )
         engine.recorder = self._books = BookKeeper(engine, self._trace)
+        prefix = engine.guid.prefix  # security may have adjusted it
         self.port = Port(metatraffic, prefix, self._receive)
         self._user_port = Port(user, prefix, self._receive)
         self.network.open(self.port, groups)

@@ -54,6 +54,19 @@ def test_multicast_reaches_all_members_but_the_sender() -> None:
     assert (a.octets, b.octets, c.octets, outsider.octets) == ([], [b"all"], [b"all"], [])
 
 
+def test_a_chosen_datagram_is_lost_for_one_receiver() -> None:
+    trace = MemorySink()
+    net = network(trace=trace)
+    a, b, c = Host(net, 1), Host(net, 2), Host(net, 3)
+    net.loses = lambda sender, receiver, octets: (sender, receiver, octets) == (a.prefix, b.prefix, b"first")
+    for octets in (b"first", b"second"):
+        net.send(a.port, (GROUP,), octets)
+    net.run_until(1)
+    assert (b.octets, c.octets) == ([b"second"], [b"first", b"second"])
+    (lost,) = (event for event in trace.events if isinstance(event, LinkDropped))
+    assert (lost.octets, lost.receiver, lost.reason) == (b"first", b.prefix, "loss")
+
+
 def test_participants_of_one_host_hear_each_others_multicast() -> None:
     net = network(loss=1.0)
     a, neighbour, other = Host(net, 1), Host(net, 1, port=7412), Host(net, 2)
