@@ -37,7 +37,7 @@ def main(words: Sequence[str] | None = None) -> int:
     outcomes = trio.run(_run_all, cases, pairs, arguments)
     if arguments.output is not None or not (arguments.peer or arguments.case or arguments.ours):
         folder = arguments.output or RESULTS
-        write_report([outcome for outcome in outcomes if outcome.verdict is not Verdict.NOT_APPLICABLE], peers, folder)
+        write_report(outcomes, peers, folder)
         print(f"written: {folder}")
     failures = [outcome for outcome in outcomes if outcome.verdict is Verdict.FAILED]
     for outcome in failures:

@@ -59,11 +59,12 @@ def write_report(outcomes: Sequence[Outcome], peers: Sequence[Peer], folder: Pat
     ):
         names = {case.name for case in cases}
         chosen = [outcome for outcome in outcomes if outcome.case in names]
-        present = {peer for outcome in chosen for peer in (outcome.publisher, outcome.subscriber)}
+        played = [outcome for outcome in chosen if outcome.verdict is not Verdict.NOT_APPLICABLE]
+        present = {peer for outcome in played for peer in (outcome.publisher, outcome.subscriber)}
         who = [peer for peer in peers if peer.name in present]
-        if chosen:
+        if played:
             versions = {peer.name: {"title": peer.title, "version": peer.version()} for peer in who}
-            document = {"peers": versions, "outcomes": [_as_json(outcome) for outcome in chosen]}
+            document = {"peers": versions, "outcomes": [_as_json(outcome) for outcome in played]}
             Path(folder, f"{name}.json").write_text(json.dumps(document, indent=1) + "\n")
             lines = _markdown(introduction, cases, chosen, who)
             Path(folder, f"{name}.md").write_text("\n".join(lines) + "\n")
@@ -81,7 +82,13 @@ def _markdown(
     yield introduction
     yield "| name | implementation | version |\n|---|---|---|"
     yield from (f"| {peer.name} | {peer.title} | {peer.version()} |" for peer in peers)
-    pairs = list(dict.fromkeys((outcome.publisher, outcome.subscriber) for outcome in outcomes))
+    pairs = list(
+        dict.fromkeys(
+            (outcome.publisher, outcome.subscriber)
+            for outcome in outcomes
+            if outcome.verdict is not Verdict.NOT_APPLICABLE
+        )
+    )
     yield "\n## Ours with everybody\n"
     yield from _table(outcomes, [pair for pair in pairs if OURS.name in pair])
     if foreign := [pair for pair in pairs if OURS.name not in pair]:
@@ -98,9 +105,10 @@ def _table(outcomes: Sequence[Outcome], pairs: Sequence[tuple[str, str]]) -> Ite
     yield "| case | " + " | ".join(f"{publisher} to {subscriber}" for publisher, subscriber in pairs) + " |"
     yield "|---" * (len(pairs) + 1) + "|"
     for case in dict.fromkeys(outcome.case for outcome in outcomes):
-        marks = [by_place.get((case, *pair)) for pair in pairs]
-        if any(outcome is not None for outcome in marks):
-            yield f"| {case} | " + " | ".join(MARKS[outcome.verdict] if outcome else "" for outcome in marks) + " |"
+        played = [by_place.get((case, *pair)) for pair in pairs]
+        if any(outcome is not None and outcome.verdict is not Verdict.NOT_APPLICABLE for outcome in played):
+            marks = [MARKS[outcome.verdict if outcome else Verdict.UNAVAILABLE] for outcome in played]
+            yield f"| {case} | " + " | ".join(marks) + " |"
 
 
 def _reasons(heading: str, outcomes: Sequence[Outcome], verdict: Verdict) -> Iterable[str]:
