@@ -139,7 +139,7 @@ class AdmissionDesk:
 
     def _refused_at_once(self, remote: RemoteParticipant, reason: str) -> Refused:
         remote.standing, remote.reason = Standing.REFUSED, reason
-        self._log(LogLevel.WARNING_LEVEL, f"participant {remote.guid} is refused: {reason}", "refused")
+        self._log(LogLevel.WARNING_LEVEL, f"participant {remote.guid} is refused: {reason}", "refused", remote.guid)
         return Refused(reason)
 
     @staticmethod
@@ -230,12 +230,19 @@ class AdmissionDesk:
         """Said once for each new reason: what a stranger sends must not fill the log."""
         if reason != remote.reason:
             remote.reason = reason
-            self._log(LogLevel.WARNING_LEVEL, f"authentication of {remote.guid}: {reason}", "authentication")
+            self._log(
+                LogLevel.WARNING_LEVEL, f"authentication of {remote.guid}: {reason}", "authentication", remote.guid
+            )
             self._effects.append(Decided(self._own.guid, remote.guid, Refused(reason)))
 
     def _failed(self, remote: RemoteParticipant, reason: str) -> None:
         if remote.standing is Standing.PENDING and self._own.attributes.allow_unauthenticated_participants:
-            self._log(LogLevel.NOTICE_LEVEL, f"{remote.guid} is taken as unauthenticated: {reason}", "authentication")
+            self._log(
+                LogLevel.NOTICE_LEVEL,
+                f"{remote.guid} is taken as unauthenticated: {reason}",
+                "authentication",
+                remote.guid,
+            )
             remote.standing, remote.handshake = Standing.UNAUTHENTICATED, None
             self._changed()
             self._effects.append(Decided(self._own.guid, remote.guid, ADMITTED))
@@ -307,9 +314,16 @@ class AdmissionDesk:
                 if remote.handshake is not None:
                     remote.handshake.close()
                 remote.handshake, remote.renewal = handshake, None
-            self._log(LogLevel.NOTICE_LEVEL, f"{remote.guid}, {subject}, authenticated anew", "authenticated")
+            self._log(
+                LogLevel.NOTICE_LEVEL, f"{remote.guid}, {subject}, authenticated anew", "authenticated", remote.guid
+            )
         else:
-            self._log(LogLevel.INFO_LEVEL, f"participant {remote.guid} is {subject}, authenticated", "authenticated")
+            self._log(
+                LogLevel.INFO_LEVEL,
+                f"participant {remote.guid} is {subject}, authenticated",
+                "authenticated",
+                remote.guid,
+            )
         remote.crypto, remote.shared_secret, remote.permissions = crypto, shared_secret, permissions
         if remote.standing is Standing.ADMITTED:
             volatile = [endpoint for endpoint in self._own.endpoints.values() if endpoint.is_volatile]
@@ -320,7 +334,7 @@ class AdmissionDesk:
 
     def _refuse(self, remote: RemoteParticipant, reason: str) -> None:
         """It may not join, or not any longer; and it will not be asked again under this Guid."""
-        self._log(LogLevel.WARNING_LEVEL, f"participant {remote.guid} is refused: {reason}", "refused")
+        self._log(LogLevel.WARNING_LEVEL, f"participant {remote.guid} is refused: {reason}", "refused", remote.guid)
         self._ban(remote.guid, reason)
         self._release(remote)
         remote.standing, remote.reason = Standing.REFUSED, reason
@@ -375,8 +389,8 @@ class AdmissionDesk:
             if concerns(remote):
                 self._refuse(remote, f"{what} {remote.guid} have ended")
 
-    def _log(self, level: LogLevel, text: str, category: str) -> None:
-        self._plugins.logging.log(level, text, category)
+    def _log(self, level: LogLevel, text: str, category: str, entity: Guid | None = None) -> None:
+        self._plugins.logging.log(level, text, category, entity=entity)
 
 
 def _identity_of(remote: RemoteParticipant) -> IdentityHandle | None:

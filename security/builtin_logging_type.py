@@ -15,6 +15,7 @@ from ddsi.xtypes import idl
 __all__ = [
     "FACILITY_SECURITY",
     "LOG_TOPIC_NAME",
+    "LOG_TYPE_NAME",
     "BuiltinLoggingTypeV2",
     "LogLevel",
     "NameValuePair",
@@ -23,6 +24,7 @@ __all__ = [
 ]
 
 LOG_TOPIC_NAME: Final = "DDS:Security:LogTopicV2"
+LOG_TYPE_NAME: Final = "DDSSecurity::BuiltinLoggingTypeV2"
 
 FACILITY_SECURITY: Final = 10
 """The facility of syslog for security and authorization messages (RFC 5424 §6.2.1)."""
@@ -63,7 +65,7 @@ class StructuredDataEntry:
     pairs: idl.sequence[NameValuePair]
 
 
-@idl.struct(typename="DDSSecurity::BuiltinLoggingTypeV2", extensibility=idl.APPENDABLE)
+@idl.struct(typename=LOG_TYPE_NAME, extensibility=idl.APPENDABLE)
 class BuiltinLoggingTypeV2:
     """One event.  All texts are printable and bounded, whoever supplied them.
 

@@ -25,16 +25,20 @@ from ddsi.spi import (
     Overhead,
     Parts,
     ProtectedEndpoint,
+    Publish,
     Refused,
 )
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.cache_change import CacheChange
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import Guid, GuidPrefix
-from ddsi.structure.qos_policies import Properties
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.qos_policies import DataRepresentationId, KeepLast, Properties, Reliable, TransientLocal
+from ddsi.xtypes import serialize
 
 from .admission import AdmissionDesk
 from .announced import endpoint_info, endpoint_refusal, info
+from .builtin_logging_type import LOG_TOPIC_NAME, LOG_TYPE_NAME, BuiltinLoggingTypeV2
 from .handshake import State
 from .key_exchange import KeyExchange
 from .loading import Plugins, load_plugins
@@ -48,6 +52,8 @@ from .remote_participant import RemoteParticipant, Standing
 __all__ = ["SecurityService", "load"]
 
 _STATELESS: Final = (ids.PARTICIPANT_STATELESS_MESSAGE_WRITER, ids.PARTICIPANT_STATELESS_MESSAGE_READER)
+_LOG_QOS: Final = EndpointQos(reliability=Reliable(), durability=TransientLocal(), history=KeepLast(100))
+"""Who looks later sees what happened before; the OMG leaves it open (§9.6)."""
 _WALL_CLOCK_CHECK_S: Final = 300.0
 """A wall clock may be set: what expires by it is looked at this often, whatever it said before (Cyclone DDS)."""
 
@@ -69,6 +75,7 @@ class SecurityService:
 
     def local_participant(self, candidate: LocalParticipant) -> Guid:
         plugins = self._plugins
+        plugins.logging.set_listener(self)
         plugins.logging.enable_logging()
         own = self._own = OwnParticipant(plugins, candidate)
         plugins.logging.set_participant(own.guid, own.domain_id)
@@ -120,6 +127,11 @@ class SecurityService:
         if endpoint is not None:
             self._keys.endpoint_deleted(endpoint)
             self._protection.changed()
+
+    def on_log_message(self, event: BuiltinLoggingTypeV2) -> None:
+        """The logging plugin wants an event published (§8.6.2)."""
+        payload = serialize(event, representation=DataRepresentationId.XCDR1)
+        self._effects.append(Publish(LOG_TOPIC_NAME, LOG_TYPE_NAME, _LOG_QOS, payload))
 
     # --- others ------------------------------------------------------------------------------------------
 
@@ -211,7 +223,7 @@ class SecurityService:
             self._protection.changed()
             if refusal is not None:
                 text = f"a key message of {remote.guid}: {refusal.reason}"
-                self._plugins.logging.log(LogLevel.WARNING_LEVEL, text, "key exchange")
+                self._plugins.logging.log(LogLevel.WARNING_LEVEL, text, "key exchange", entity=remote.guid)
         self._rearm()
 
     def computed(self, effect: Compute, result: object, now: float) -> None:

@@ -38,6 +38,7 @@ from ..spi import (
     HookEffect,
     LocalParticipant,
     Octets,
+    Publish,
     Revoked,
     SecurityHooks,
     SendMessage,
@@ -45,6 +46,7 @@ from ..spi import (
 from ..spi import Compute as HookCompute
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.errors import NotAllowedBySecurity
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
@@ -148,6 +150,7 @@ class Participant:
         self._readers_by_topic: dict[str, dict[Guid, LocalReader]] = {}
         self.remote_writers: dict[bytes, RemoteWriter] = {}
         self.closing: set[Guid] = set()
+        self._hook_writers: dict[str, LocalWriter] = {}
         self.defrag_budget = DefragBudget(setup.config.max_defrag_octets)
         self.stateless_defrag_budget = DefragBudget(_STATELESS_DEFRAG_OCTETS)
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
@@ -583,6 +586,8 @@ class Participant:
         match effect:
             case SendMessage(writer_id, change):
                 self._send_generic_message(self.local_writers[Guid.of(self.guid.prefix, writer_id)], change)
+            case Publish():
+                self._publish(effect)
             case HookCompute():
                 self._effects.append(Compute(effect.job, partial(self._computed, effect)))
             case Decided(local, remote, admission):
@@ -604,6 +609,18 @@ class Participant:
             self.discovery.participant_lost(destination, LossReason.UNRESPONSIVE, self.now)
             return
         self.write(writer, change.kind, bytes(change.payload), change.key, self.now, destination=destination)
+
+    def _publish(self, effect: Publish) -> None:
+        """What the hooks have to tell everybody, with a writer of theirs on that topic."""
+        writer = self._hook_writers.get(effect.topic_name)
+        if writer is None:
+            try:
+                writer = self.create_writer(effect.topic_name, effect.type_name, effect.qos, self.now, is_keyed=False)
+            except NotAllowedBySecurity:
+                return
+            self._hook_writers[effect.topic_name] = writer
+        if writer.guid in self.local_writers and writer.behavior.lacks_room(len(effect.payload), b"") is None:
+            self.write(writer, ChangeKind.ALIVE, effect.payload, b"", self.now)
 
     def _decided(self, local: Guid, remote: Guid, admission: Admission) -> None:
         if local != self.guid:

@@ -23,6 +23,7 @@ from ..structure.discovered import (
     Parameter,
 )
 from ..structure.guid import EntityId, Guid, GuidPrefix
+from ..structure.qos import EndpointQos
 from ..structure.qos_policies import Properties
 from .outcomes import Admission, Outcome, Overhead
 
@@ -35,6 +36,7 @@ __all__ = [
     "Octets",
     "Parts",
     "ProtectedEndpoint",
+    "Publish",
     "Revoked",
     "SecurityHooks",
     "SendMessage",
@@ -93,6 +95,19 @@ class SendMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class Publish:
+    """Effect: write a sample, serialised already, on a keyless topic, for everybody who may read it (§8.6: the log).
+
+    The writer is made when it is wanted first, with ``qos``, and stays; where security forbids it nothing is written.
+    """
+
+    topic_name: str
+    type_name: str
+    qos: EndpointQos
+    payload: bytes = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Compute:
     """Effect: run ``job`` in a worker thread and give its result to :meth:`SecurityHooks.computed`.
 
@@ -128,7 +143,7 @@ class Revoked:
     reason: str
 
 
-HookEffect = SendMessage | Compute | Decided | Revoked
+HookEffect = SendMessage | Publish | Compute | Decided | Revoked
 
 
 class SecurityHooks(Protocol):
