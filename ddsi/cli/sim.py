@@ -1,5 +1,7 @@
 """``ddsi sim``: a domain of engines over a simulated network and clock; the same seed does the same, always.
 
+``ddsi sim handshake`` walks through the meeting of two secured participants (:mod:`.sim_handshake`).
+
 Without a scenario's name, the seed makes its own: participants, endpoints, weather, crashes.  Every run checks the
 invariants of ``ddsi.simulation``; one that fails tells how to have it again.
 """
@@ -17,6 +19,7 @@ from ..simulation.scenario import Failure, Scenario
 from ..trace.event import TraceEvent
 from ..trace.sequence_diagram import DEFAULT_CATEGORIES, sequence_diagram
 from ..trace.sink import JsonLinesSink, TraceSink
+from . import sim_handshake
 from .arguments import add_json, count
 from .exit_status import CommandError, ExitStatus
 from .sim_scenarios import RANDOM, SCENARIOS, NamedScenario
@@ -27,11 +30,13 @@ __all__ = ["SUMMARY", "add_arguments", "run"]
 
 SUMMARY = "run a scenario over a simulated network, from a seed"
 
+_HANDSHAKE = "handshake"
 _REST_S = 60.0
 _HIGHEST_SEED = (1 << 63) - 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("walk", nargs="?", choices=(_HANDSHAKE,), metavar=_HANDSHAKE, help="walk through it; see below")
     parser.add_argument("--seed", type=_seed, default=0, metavar="N", help="what chance does (default: 0)")
     parser.add_argument(
         "--scenario",
@@ -48,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="draw only these categories (ddsi trace --help names them)")  # fmt: skip
     parser.add_argument("--trace", metavar="FILE", help="write the trace as JSON lines, for ddsi trace FILE")
     add_json(parser)
+    sim_handshake.add_arguments(parser)
 
 
 def _seed(text: str) -> int:
@@ -61,6 +67,10 @@ def _seed(text: str) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    if arguments.walk == _HANDSHAKE:
+        return _walk(arguments)
+    if arguments.drop or arguments.step or arguments.keystore:
+        raise CommandError("--drop, --step and --keystore are for ddsi sim handshake")
     if arguments.list:
         return _list()
     if arguments.plan:
@@ -71,6 +81,13 @@ def run(arguments: argparse.Namespace) -> int:
     for seed in range(arguments.seed, arguments.seed + arguments.count):
         failed += not _run_seed(arguments, seed)
     return ExitStatus.NOT_AS_HOPED if failed else ExitStatus.OK
+
+
+def _walk(arguments: argparse.Namespace) -> int:
+    others = (arguments.list, arguments.plan, arguments.diagram, arguments.trace, arguments.json)
+    if any(others) or arguments.count > 1 or arguments.scenario != RANDOM:
+        raise CommandError("of the options for scenarios, ddsi sim handshake takes --seed alone")
+    return sim_handshake.run(arguments)
 
 
 def _list() -> int:

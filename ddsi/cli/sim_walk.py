@@ -1,0 +1,414 @@
+"""Walk: the meeting of two secured participants in a simulation, told line by line as it happens.
+
+DDS-Security 1.1 §8.8.2 to §8.8.10.  What each says is heard at the seam (:mod:`.sim_seam`), what it comes to is taken
+from the trace.  Of tokens and keys only names and sizes are told.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import cast
+
+from ..messages.acknack import AckNack
+from ..messages.data import Data
+from ..messages.heartbeat import Heartbeat
+from ..serialization import ParameterId, ParameterList
+from ..serialization.encapsulation import HEADER_LENGTH, decode_encapsulation
+from ..simulation import Dice, Domain, LinkConditions
+from ..spi import SecurityHooks, load_hooks
+from ..structure import builtin_entity_ids as ids
+from ..structure.guid import EntityId, Guid, GuidPrefix
+from ..structure.qos import Qos
+from ..structure.qos_policies import KeepAll, Properties, Reliable
+from ..trace.event import TraceEvent
+from ..trace.events import Matched, SampleDelivered, SecurityEvent
+from ..trace.generic_message import GenericMessageOutline, generic_message_in
+from ..trace.names import Names
+from ..trace.reasons import SecurityStep
+from ..trace.wording import number_ranges, range_text
+from .sim_handshake_words import KINDS
+from .sim_seam import Said, WatchedHooks
+
+__all__ = ["Walk"]
+
+_DELAY_S = 0.001
+_LARGEST_MESSAGE = 65_000
+"""Each message of the handshake in one datagram, so that losing it is losing one."""
+_LIMIT_S = 20.0
+_AFTERMATH_S = 0.01
+_TOPIC = "Square"
+_QOS = Qos(reliability=Reliable(), history=KeepAll())
+_SAMPLE_OCTETS = 32
+_INDENT = " " * 22
+
+_DISCOVERY = frozenset(
+    {ids.SPDP_SECURE_WRITER, ids.SEDP_PUBLICATIONS_SECURE_WRITER, ids.SEDP_SUBSCRIPTIONS_SECURE_WRITER,
+     ids.SEDP_PUBLICATIONS_WRITER, ids.SEDP_SUBSCRIPTIONS_WRITER}
+)  # fmt: skip
+
+
+@dataclass(slots=True)
+class _Side:
+    """One of the two.  ``path``: the states that its handshake went through and that were not told yet."""
+
+    name: str
+    hooks: WatchedHooks
+    path: list[Enum] = field(default_factory=list)
+    cause: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Message:
+    """A message that counts.  ``identity``: the same for all that repeat it."""
+
+    number: int
+    kind: str
+    identity: tuple[object, ...]
+    said: Said
+    data: Data
+    outline: GenericMessageOutline | None
+
+
+@dataclass(slots=True)
+class _Loss:
+    """What was lost, and what is known since: who noticed, and when it was said again."""
+
+    message: _Message
+    at: float
+    sender: str
+    receiver: str
+    noticed: str = ""
+    repeated_at: float | None = None
+
+
+class Walk:
+    """``identities``: the security properties of two participants, by name.  ``dropped``: a kind of message by its
+    name, or a message by its number.  ``pause()`` is called between datagrams until it is False."""
+
+    def __init__(
+        self,
+        identities: dict[str, Properties],
+        *,
+        seed: int,
+        dropped: str | int | None,
+        started_ns: int,
+        width: int,
+        ascii_only: bool,
+        pause: Callable[[], bool] | None,
+    ) -> None:
+        self._dropped = dropped
+        self._width = width
+        self._arrow, self._cross = ("->", "x") if ascii_only else ("→", "✗")
+        self._pause = pause
+        self._sides: dict[GuidPrefix, _Side] = {}
+        self._names = Names()
+        self._count = 0
+        self._explained: set[str] = set()
+        self._arrived: set[tuple[object, ...]] = set()
+        self._numbers: dict[tuple[object, ...], int] = {}
+        self._loss: _Loss | None = None
+        self._lost: set[tuple[object, ...]] = set()
+        self._domain = Domain(seed, conditions=LinkConditions(delay=_DELAY_S), trace=self._notice)
+        self._domain.network.loses = lambda sender, receiver, octets: True  # until both are there
+        dice = Dice(seed)
+        for name, properties in identities.items():
+            self._join(name, properties, dice.fork(), started_ns)
+        self._domain.network.loses = self._sent
+
+    def _join(self, name: str, properties: Properties, dice: Dice, started_ns: int) -> None:
+        side: _Side
+
+        def moved(before: Enum | None, after: Enum, cause: str) -> None:
+            if not side.path:
+                side.cause = cause
+                side.path.extend([before] if before is not None else [])
+            side.path.append(after)
+
+        inner = load_hooks(
+            properties,
+            entropy=dice.octets,
+            wall_clock=lambda: started_ns + int(self._domain.now * 1e9),
+        )
+        side = _Side(name, WatchedHooks(inner, moved))
+        hooks = cast(SecurityHooks, side.hooks)  # what it does not name itself, it passes on
+        node = self._domain.node(
+            name=name, properties=properties, make_hooks=lambda: hooks, max_message_octets=_LARGEST_MESSAGE
+        )
+        self._sides[node.guid.prefix] = side
+
+    # --- the walk ----------------------------------------------------------------------------------------
+
+    def run(self) -> bool:
+        """Until a sample has crossed, protected; returns whether it did, and what was to be lost was."""
+        first, second = self._domain.nodes
+        lower, higher = sorted((first, second), key=lambda node: node.guid)
+        for node in (lower, higher):
+            self._tell(f"{node.name} is {node.guid}")
+        self._tell(f"{lower.name} has the lower Guid and begins (§8.3.2.11.3).  § is DDS-Security 1.1.")
+        writer = first.writer(_TOPIC, _QOS)
+        reader = second.reader(_TOPIC, _QOS)
+        is_matched = self._live(lambda: bool(writer.matched_count and reader.matched_count))
+        if is_matched:
+            writer.write(_SAMPLE_OCTETS)
+        is_done = is_matched and self._live(lambda: bool(reader.taken))
+        loss = self._loss
+        if loss is not None and loss.message.kind in _RELIABLE:
+            is_done = is_done and self._live(lambda: loss.repeated_at is not None)
+        self._live(lambda: False, _AFTERMATH_S)
+        return self._conclude(is_done)
+
+    def _live(self, condition: Callable[[], bool], limit_s: float = _LIMIT_S) -> bool:
+        def is_over() -> bool:
+            self._tell_states()
+            return condition()
+
+        return self._domain.run_until(is_over, limit_s)
+
+    def _conclude(self, is_done: bool) -> bool:
+        self._tell("")
+        if not is_done:
+            missing = "no sample has crossed" if self._loss is None else "what was lost is not repaired"
+            self._tell(f"After {self._domain.now:g} s {missing}.")
+            return False
+        if self._loss is None:
+            if self._dropped is None:
+                self._tell(f"{self._count} messages, nothing lost.  --drop MESSAGE loses one.")
+            else:
+                self._tell(f"No message {self._dropped} was sent, so none was lost.")
+            return self._dropped is None
+        loss = self._loss
+        kind = KINDS[loss.message.kind]
+        self._tell(f"Lost: {loss.message.number} {kind.title} of {loss.sender} to {loss.receiver}, at {loss.at:.6f} s.")
+        if loss.repeated_at is None:
+            self._tell("It was never said again: nothing came to need it.")
+        else:
+            self._tell(f"Noticed by {loss.noticed}.")
+            later = loss.repeated_at - loss.at
+            self._tell(f"Said again at {loss.repeated_at:.6f} s, {later:.3f} s after it was lost.")
+        self._tell(f"The rule: {kind.repair}")
+        return True
+
+    # --- what happens ------------------------------------------------------------------------------------
+
+    def _notice(self, event: TraceEvent) -> None:
+        """From the trace: what it comes to."""
+        self._names.learn_event(event)
+        side = self._sides.get(event.participant)
+        if side is None:
+            return
+        match event:
+            case SecurityEvent(what=SecurityStep.ADMITTED):
+                self._tell_states()
+                self._tell_result(side, "admits the other: its permissions allow it to join (§8.4.2.9.2, §8.4.2.9.9)")
+            case SecurityEvent(what=SecurityStep.REFUSED, detail=detail):
+                self._tell_states()
+                self._tell_result(side, f"refuses: {detail}")
+            case Matched(local=local, topic_name=topic_name) if not local.entity_id.is_builtin:
+                role = "writer" if local.entity_id.is_writer else "reader"
+                self._tell_result(side, f"matches its {role} of {topic_name}: both sides' keys are there (§8.8.9)")
+            case SampleDelivered(reader=reader) if not reader.entity_id.is_builtin:
+                self._tell_result(side, f"has the sample of {_TOPIC}, checked and decrypted (§8.5.1.9.5 to §8.5.1.9.9)")
+
+    def _sent(self, sender: GuidPrefix, receiver: GuidPrefix, octets: bytes) -> bool:
+        """A datagram is on its way; True to lose it."""
+        side, other = self._sides.get(sender), self._sides.get(receiver)
+        if side is None or other is None:
+            return False
+        said = side.hooks.said_in(octets)
+        messages, notes = self._messages(said), self._notes(said)
+        is_lost = self._loss is None and any(self._dropped in (it.kind, it.number) for it in messages)
+        self._tell_states()
+        if messages or notes:
+            if self._pause is not None and not self._pause():
+                self._pause = None
+            self._tell(f"{self._domain.now:.6f} s  {side.name} {self._arrow} {other.name}")
+        for message in messages:
+            self._tell_message(message, side)
+        for note in notes:
+            self._tell(note, indent=_INDENT)
+        if is_lost:
+            self._lose(messages, side, other)
+        else:
+            self._arrived.update(message.identity for message in messages)
+            self._watch_for_repair(side, said, messages)
+        return is_lost
+
+    def _lose(self, messages: Sequence[_Message], side: _Side, other: _Side) -> None:
+        self._lost = {message.identity for message in messages}
+        named = next(message for message in messages if self._dropped in (message.kind, message.number))
+        self._loss = _Loss(named, self._domain.now, side.name, other.name)
+        company = len(messages) - 1
+        also = f", and {company} more in the same datagram" if company else ""
+        self._tell(f"{self._cross} lost: {named.number}{also}.  Nobody knows yet.", indent=_INDENT)
+
+    def _watch_for_repair(self, side: _Side, said: Sequence[Said], messages: Sequence[_Message]) -> None:
+        loss = self._loss
+        if loss is None or loss.repeated_at is not None:
+            return
+        is_asked_for = side.name == loss.receiver and any(_asks_for(it.submessage, loss.message) for it in said)
+        if is_asked_for and not loss.noticed:
+            loss.noticed = f"{side.name}, which asks by ACKNACK at {self._domain.now:.6f} s"
+        for message in messages:
+            is_repeated = self._numbers[message.identity] < message.number
+            if is_repeated and not loss.noticed and loss.message.kind not in _RELIABLE:
+                loss.noticed = f"{side.name} at {self._domain.now:.6f} s ({_because(side.hooks.cause)})"
+            if message.identity == loss.message.identity:
+                loss.repeated_at = self._domain.now
+
+    # --- what is in a datagram ---------------------------------------------------------------------------
+
+    def _messages(self, said: Sequence[Said]) -> list[_Message]:
+        """Those that count, numbered; an announcement that has arrived before is none."""
+        messages = []
+        for it in said:
+            if not isinstance(it.submessage, Data):
+                continue
+            outline = generic_message_in(it.submessage)
+            kind = _kind(it.submessage, outline)
+            identity = _identity(it, kind, outline)
+            if kind not in KINDS or (kind == "announcement" and identity in self._arrived):
+                continue
+            self._count += 1
+            messages.append(_Message(self._count, kind, identity, it, it.submessage, outline))
+        return messages
+
+    def _notes(self, said: Sequence[Said]) -> list[str]:
+        """The last HEARTBEAT and ACKNACK of each topic that carries keys or samples, unless it says nothing; and of the
+        one on which something was lost."""
+        notes: dict[tuple[Guid, str], str] = {}
+        for it in said:
+            if not isinstance(it.submessage, Heartbeat | AckNack) or not self._is_worth_a_note(it.submessage.writer_id):
+                continue
+            topic = self._names.entity(it.sender.prefix, it.sender.entity_id)
+            match it.submessage:
+                case Heartbeat(first_sn=first, last_sn=last) if last >= first:
+                    notes[it.sender, "HEARTBEAT"] = f"HEARTBEAT of {topic}: I have {range_text(first, last)}"
+                case AckNack(reader_sn_state=wanted) if wanted:
+                    notes[it.sender, "ACKNACK"] = f"ACKNACK of {topic}: {number_ranges(wanted)} are missing here"
+                case AckNack(reader_sn_state=wanted) if wanted.base > 1:
+                    notes[it.sender, "ACKNACK"] = f"ACKNACK of {topic}: I have all before {wanted.base}"
+        return list(notes.values())
+
+    def _is_worth_a_note(self, writer: EntityId) -> bool:
+        if not writer.is_builtin or writer == ids.PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER:
+            return True
+        return self._loss is not None and self._loss.message.data.writer_id == writer
+
+    # --- telling -----------------------------------------------------------------------------------------
+
+    def _tell_message(self, message: _Message, side: _Side) -> None:
+        kind = KINDS[message.kind]
+        number = f"{message.number:>18}  "
+        self._tell(f"{kind.title}{self._about(message)}{self._again(message, side)}", indent=number)
+        self._numbers.setdefault(message.identity, message.number)
+        if message.kind in self._explained:
+            return
+        self._explained.add(message.kind)
+        self._tell(f"{kind.clause}: {kind.purpose}", indent=_INDENT)
+        holds = _holds(message)
+        if holds:
+            self._tell(holds, indent=_INDENT)
+        self._tell(_protection(message), indent=_INDENT)
+
+    def _about(self, message: _Message) -> str:
+        """Which endpoint it concerns."""
+        sender = message.said.sender
+        if message.kind in ("discovery", "data"):
+            return f" of {self._names.entity(sender.prefix, sender.entity_id)} #{message.data.writer_sn}"
+        if message.kind in ("writer-tokens", "reader-tokens") and message.outline is not None:
+            source = message.outline.source_endpoint
+            return f" for {self._names.entity(source.prefix, source.entity_id)}"
+        return ""
+
+    def _again(self, message: _Message, side: _Side) -> str:
+        before = self._numbers.get(message.identity)
+        if before is None:
+            return ""
+        why = "" if message.kind in _RELIABLE else f" ({_because(side.hooks.cause)})"
+        return f"{why}: {before} again{', which was lost' if message.identity in self._lost else ''}"
+
+    def _tell_states(self) -> None:
+        for side in self._sides.values():
+            if side.path:
+                states = f" {self._arrow} ".join(state.name for state in side.path)
+                self._tell_result(side, f"({_because(side.cause)}) {states}: {side.path[-1].value}")
+                side.path.clear()
+
+    def _tell_result(self, side: _Side, text: str) -> None:
+        self._tell(text, indent=f"{self._domain.now:.6f} s  {side.name:<8}  ")
+
+    def _tell(self, text: str, *, indent: str = "") -> None:
+        lines = textwrap.wrap(
+            text, self._width, initial_indent=indent, subsequent_indent=_INDENT if indent else "",
+            break_long_words=False,
+        )  # fmt: skip
+        print("\n".join(lines), flush=True)
+
+
+_SECURITY_PIDS = (ParameterId.IDENTITY_TOKEN, ParameterId.PERMISSIONS_TOKEN, ParameterId.PARTICIPANT_SECURITY_INFO)
+_RELIABLE = frozenset({"participant-tokens", "writer-tokens", "reader-tokens", "discovery", "data"})
+
+
+def _kind(data: Data, outline: GenericMessageOutline | None) -> str:
+    """Its name in KINDS; any other for what does not count."""
+    if outline is not None:
+        return outline.kind
+    if data.writer_id == ids.SPDP_WRITER:
+        return "announcement"
+    if data.writer_id in _DISCOVERY:
+        return "discovery"
+    return "other" if data.writer_id.is_builtin else "data"
+
+
+def _identity(said: Said, kind: str, outline: GenericMessageOutline | None) -> tuple[object, ...]:
+    """On reliable topics a sample keeps its number; on the stateless one it gets a new one each time."""
+    if kind in _RELIABLE:
+        assert isinstance(said.submessage, Data)
+        return said.sender, said.submessage.writer_sn
+    return said.sender, kind, outline.fingerprint if outline is not None else 0
+
+
+def _asks_for(submessage: object, message: _Message) -> bool:
+    return (
+        isinstance(submessage, AckNack)
+        and submessage.writer_id == message.data.writer_id
+        and message.data.writer_sn in submessage.reader_sn_state
+    )
+
+
+def _because(cause: str) -> str:
+    if cause in KINDS:
+        return f"the {KINDS[cause].title} came"
+    return "it has seen the announcement" if cause == "the announcement" else cause
+
+
+def _holds(message: _Message) -> str:
+    """Names and sizes of what the token is made of."""
+    if message.kind == "announcement":
+        return _announced(message.data)
+    if message.outline is None:
+        return ""
+    tokens = []
+    for token in message.outline.tokens:
+        sizes = ", ".join(f"{name} {size}" for name, size in token.sizes)
+        tokens.append(f"{token.class_id} with {sizes}")
+    return f"{message.outline.octets} octets: {'; '.join(tokens)} octets"
+
+
+def _announced(data: Data) -> str:
+    """Which parameters of an announcement are for security, with their sizes."""
+    parameters, _ = ParameterList.decode(
+        data.serialized_payload,
+        little_endian=decode_encapsulation(data.serialized_payload).encapsulation.little_endian,
+        start=HEADER_LENGTH,
+    )
+    sizes = [f"{pid.name} {len(value)}" for pid in _SECURITY_PIDS if (value := parameters.get(pid)) is not None]
+    return f"{len(data.serialized_payload)} octets, among them {', '.join(sizes)}" if sizes else ""
+
+
+def _protection(message: _Message) -> str:
+    layers = message.said.protected
+    return f"protected: {', '.join(layers)}" if layers else "in clear"
