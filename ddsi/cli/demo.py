@@ -18,7 +18,7 @@ import trio
 
 from .arguments import domain_id
 from .demo_secured import SecuredScene, missing_packages
-from .demo_stage import Actor, Stage, failures, open_stage
+from .demo_stage import OURS, Actor, Stage, failures, open_stage
 from .exit_status import ExitStatus
 from .runner import run as run_async
 from .tables import shown
@@ -112,8 +112,8 @@ class _Demo:
         subscribe = ["shapes", "sub", "-t", topics, "-n", str(total)]
         publish = ["shapes", "pub", "-t", "Square", "-c", "BLUE", "-n", str(_SAMPLES), "--rate", str(_RATE_HZ)]
         publish += ["--wait", str(readers)]
-        subscriber = await stage.start_ours("subscriber", [*subscribe, *common], verb="received")
-        publisher = await stage.start_ours("publisher", [*publish, *common], verb="wrote", capture=capture)
+        subscriber = await stage.start("subscriber", [*OURS, *subscribe, *common], verb="received")
+        publisher = await stage.start("publisher", [*OURS, *publish, *common], verb="wrote", capture=capture)
         return subscriber, publisher
 
 

@@ -1,9 +1,13 @@
 """The second scene of ``ddsi demo``: two who may talk, and one who may not, though her certificate is good.
 
 alice and bob have identities and rights from one keystore, made on the spot.  mallory's identity is from there too, but
-her permissions are for another topic.  First her own participant tells her so (DDS-Security 1.1 §8.4.2.9.4,
-check_create_datawriter).  Then she signs herself permissions that suit her: now her own participant believes her, and
-the others do not (§8.4.2.9.2, validate_remote_permissions).
+her permissions are for another topic.  She tries three times (DDS-Security 1.1 §8.4.2.9):
+
+1. Her own participant tells her what her permissions say (§8.4.2.9.4, check_create_datawriter).
+2. She replaces the plugin that told her.  Her participant joins, as it may; her writer is refused by bob, who looks at
+   the same permissions (§8.4.2.9.10, check_remote_datawriter).
+3. She signs herself permissions that suit her.  Her own participant believes them, and the others refuse all of it
+   (§8.4.2.9.2, validate_remote_permissions).
 
 Only commands are used that anybody can type: ``ddsi keystore`` and ``ddsi shapes --secure``.
 """
@@ -19,7 +23,7 @@ from pathlib import Path
 
 import trio
 
-from .demo_stage import Actor, Stage, failures, say
+from .demo_stage import OURS, Actor, Stage, failures, say
 from .exit_status import ExitStatus
 from .tables import shown
 
@@ -28,8 +32,17 @@ __all__ = ["SecuredScene", "missing_packages"]
 _SAMPLES = 20
 _RATE_HZ = 10
 _CHILD_DEADLINE_S = 30
+_RED = ("-c", "RED", "--rate", "1")
 _REFUSAL_S = 15.0
 _NEEDED = ("cryptography", "lxml")
+_CREDULOUS = """\
+from ddsi_security.access_control import PermissionsAccessControl
+
+
+class Credulous(PermissionsAccessControl):
+    def check_create_topic(self, *arguments, **named): ...  # whatever it is: no objection
+    def check_create_datawriter(self, *arguments, **named): ...
+"""
 _SIGNED_BY_HERSELF = ("permissions_ca.cert.pem", "governance.p7s", "permissions.p7s")
 """What mallory replaces in her folder; her certificate and its key stay as the identity CA made them."""
 
@@ -82,49 +95,57 @@ class SecuredScene:
         bob = await self._shapes("bob", "sub", "-n", str(_SAMPLES), folder=self._enclave("bob"))
         if not await self._mallory_asks():
             return ["mallory's own participant did not refuse to write Square"]
-        print("mallory plays authority, and signs herself permissions for Square:")
-        self._show(forge)
-        mallory = await self._shapes("mallory", "pub", "-c", "RED", "--rate", "2", folder=self._forged_enclave())
+        intruders = [await self._mallory_replaces_a_plugin(), await self._mallory_signs(forge)]
         with trio.move_on_after(_REFUSAL_S):
-            await bob.has_refused.wait()
+            await bob.wait_for_refusals(len(intruders))
         alice = await self._shapes(
             "alice", "pub", "-c", "GREEN", "-n", str(_SAMPLES), "--rate", str(_RATE_HZ), "--wait", "1",
             folder=self._enclave("alice"), capture=self._capture,
         )  # fmt: skip
         for actor in (alice, bob):
             await actor.has_ended.wait()
-        await mallory.stop()
-        await mallory.has_ended.wait()
-        return _flaws(alice, bob, mallory)
+        for intruder in intruders:
+            await intruder.stop()
+            await intruder.has_ended.wait()
+        return _flaws(alice, bob, intruders)
+
+    def _enclave(self, name: str) -> Path:
+        return self._keystore / "enclaves" / name
 
     async def _mallory_asks(self) -> bool:
-        """Her own participant goes by what the permissions CA signed for her."""
-        asking = await self._shapes("mallory", "pub", "-c", "RED", folder=self._enclave("mallory"))
+        asking = await self._shapes("mallory", "pub", *_RED, folder=self._enclave("mallory"))
         await asking.has_ended.wait()
         if asking.process.returncode != ExitStatus.USAGE or not asking.errors:
             return False
         say("mallory", f"may not  {asking.errors[-1].removeprefix('ddsi shapes: ')}")
         return True
 
-    def _enclave(self, name: str) -> Path:
-        return self._keystore / "enclaves" / name
+    async def _mallory_replaces_a_plugin(self) -> Actor:
+        module = self._stage.folder / "credulous.py"
+        module.write_text(_CREDULOUS, encoding="utf-8")
+        print(f"\nmallory replaces the plugin that told her so, by her own {module.name}:")
+        print("".join(f"    {line}".rstrip() + "\n" for line in _CREDULOUS.splitlines()), end="")
+        choice = ["--property", "dds.sec.access.plugin=credulous:Credulous"]
+        return await self._shapes("mallory", "pub", *_RED, *choice, folder=self._enclave("mallory"))
 
-    def _forged_enclave(self) -> Path:
-        """The identity that the others trust, with the rights that she gave herself."""
+    async def _mallory_signs(self, forge: Sequence[str]) -> Actor:
+        """She keeps the identity that the others trust, and takes the rights that she gave herself."""
         folder = self._stage.folder / "forged"
         replaced = ",".join(_SIGNED_BY_HERSELF)
-        print(f"$ cp -rL keystore/enclaves/mallory forged; cp own/enclaves/mallory/{{{replaced}}} forged", flush=True)
+        print("\nmallory also plays authority, and signs herself permissions for Square:")
+        self._show(forge)
+        print(f"$ cp -rL keystore/enclaves/mallory forged; cp own/enclaves/mallory/{{{replaced}}} forged")
         shutil.copytree(self._enclave("mallory"), folder)  # files in the place of links
         for name in _SIGNED_BY_HERSELF:
             shutil.copyfile(self._own / "enclaves" / "mallory" / name, folder / name)
-        return folder
+        return await self._shapes("mallory", "pub", *_RED, folder=folder)
 
     async def _shapes(self, name: str, role: str, *words: str, folder: Path, capture: Path | None = None) -> Actor:
         common = ["-t", "Square", *self._domain, "--reliable", "--keep-all", "--time", str(_CHILD_DEADLINE_S)]
         command = ["shapes", role, *words, *common, "--secure", os.fspath(folder)]
         self._show(command)
         verb = "received" if role == "sub" else "wrote"
-        return await self._stage.start_ours(name, command, verb=verb, capture=capture)
+        return await self._stage.start(name, [*OURS, *command], verb=verb, capture=capture, modules=self._stage.folder)
 
     def _show(self, words: Sequence[str]) -> None:
         """The command as one would type it in the stage's folder."""
@@ -147,15 +168,15 @@ class SecuredScene:
         return []
 
 
-def _flaws(alice: Actor, bob: Actor, mallory: Actor) -> list[str]:
+def _flaws(alice: Actor, bob: Actor, intruders: Sequence[Actor]) -> list[str]:
     received, intruding = (bob.counts["received", "Square", colour] for colour in ("GREEN", "RED"))
     if intruding:
         return [f"bob received {intruding} samples of mallory, who may not write"]
     if received != _SAMPLES:
         return [f"bob received {received} of {_SAMPLES} samples of alice"]
-    if not bob.has_refused.is_set():
-        return ["bob did not refuse mallory"]
-    print(f"bob received all {received} samples of alice.")
-    refusing = " and ".join(actor.name for actor in (alice, bob) if actor.has_refused.is_set())
-    print(f"bob received none of the {mallory.counts['wrote', 'Square', 'RED']} of mallory, refused by {refusing}.")
+    if len(bob.refusals) < len(intruders):
+        return [f"bob refused {len(bob.refusals)} of {len(intruders)} attempts of mallory"]
+    written = sum(intruder.counts["wrote", "Square", "RED"] for intruder in intruders)
+    print(f"\nbob received all {received} samples of alice.")
+    print(f"bob received none of the {written} that mallory wrote.")
     return failures((alice, bob))

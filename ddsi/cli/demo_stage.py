@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -16,9 +17,10 @@ import trio
 from .tables import shown
 from .terminal import uses_colour
 
-__all__ = ["Actor", "Stage", "failures", "open_stage", "say"]
+__all__ = ["OURS", "Actor", "Stage", "failures", "open_stage", "say"]
 
-_OURS = ("-m", f"{__package__}")
+OURS = ("-m", f"{__package__}")
+"""``python -m ddsi.cli``: what follows is what one would type after ``ddsi``."""
 _PATIENCE_S = 3.0
 _LOOPBACK = '<Domain><General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>{}</Domain>'
 # Where the loopback has no multicast, Cyclone DDS must be told to look for others on this host, and be found there.
@@ -28,18 +30,20 @@ _FIND_BY_UNICAST = (
 )
 _CAPTURE = "<Tracing><PacketCaptureFile>{}</PacketCaptureFile></Tracing>"
 _BLUE, _GREEN, _MAGENTA, _RED = "\x1b[34m", "\x1b[32m", "\x1b[35m", "\x1b[31m"
+_INTRUDER = "mallory"
 _COLOURS = {
     "publisher": _BLUE,
     "subscriber": _GREEN,
     "cyclonedds": _MAGENTA,
     "alice": _BLUE,
     "bob": _GREEN,
-    "mallory": _RED,
+    _INTRUDER: _RED,
 }
 _RESET = "\x1b[0m"
 _MAX_LINE = 4096
 _MAX_ERRORS = 20
-_REFUSED = "ddsi shapes: refused participant "
+_REFUSED = re.compile(r"ddsi shapes: (?:\w+: )?refused (?:participant )?\S+: (.+)")
+"""What our command says of a participant, or of an endpoint of a topic, that security keeps out."""
 
 
 class Actor:
@@ -51,8 +55,9 @@ class Actor:
         self.verb = verb
         self.counts: Counter[tuple[str, str, str]] = Counter()
         self.errors: list[str] = []
+        self.refusals: set[str] = set()
+        self._refused = trio.lowlevel.ParkingLot()
         self.is_ready = trio.Event()
-        self.has_refused = trio.Event()
         self.has_ended = trio.Event()
 
     async def _read_output(self) -> None:
@@ -69,10 +74,15 @@ class Actor:
     async def _read_errors(self) -> None:
         async for line in _lines(self.process.stderr):
             self.errors = [*self.errors[-_MAX_ERRORS:], line]
-            if line.startswith(_REFUSED):
-                _, _, reason = line.removeprefix(_REFUSED).partition(": ")
-                say(self.name, f"refused  {reason}")
-                self.has_refused.set()
+            if self.name != _INTRUDER and (refusal := _REFUSED.fullmatch(line)):  # whom she refuses matters to nobody
+                say(self.name, f"refused  {refusal[1]}")
+                self.refusals.add(refusal[1])
+                self._refused.unpark_all()
+
+    async def wait_for_refusals(self, count: int) -> None:
+        """Until it has refused for so many different reasons."""
+        while len(self.refusals) < count:
+            await self._refused.park()
 
     async def follow(self) -> None:
         """Until it has ended and all that it said is counted."""
@@ -101,33 +111,40 @@ class Stage:
         self.folder = folder
         self.actors: list[Actor] = []
 
-    async def start(self, name: str, arguments: Sequence[str], *, verb: str, capture: Path | None = None) -> Actor:
-        """Python with these arguments.  ``capture`` gets what our own command sends and receives, as pcapng."""
+    async def start(
+        self,
+        name: str,
+        arguments: Sequence[str],
+        *,
+        verb: str,
+        capture: Path | None = None,
+        modules: Path | None = None,
+    ) -> Actor:
+        """Python with these arguments; OURS are those of our own command.
+
+        ``capture`` gets what our own command sends and receives, as pcapng; from ``modules`` it may import.
+        """
         process = await trio.lowlevel.open_process(
             [sys.executable, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env=_environment(capture),
+            env=_environment(capture, modules),
         )
         actor = Actor(name, process, verb)
         self.actors.append(actor)
         self._nursery.start_soon(actor.follow)
         return actor
 
-    async def start_ours(self, name: str, words: Sequence[str], *, verb: str, capture: Path | None = None) -> Actor:
-        """Our own command: ``ddsi`` and these words."""
-        return await self.start(name, [*_OURS, *words], verb=verb, capture=capture)
-
     async def run_ours(self, words: Sequence[str]) -> tuple[int, list[str]]:
         """Our own command behind the scenes, to its end: its status, and what it complained of."""
         done = await trio.run_process(
-            [sys.executable, *_OURS, *words],
+            [sys.executable, *OURS, *words],
             stdin=subprocess.DEVNULL,
             capture_stdout=True,
             capture_stderr=True,
             check=False,
-            env=_environment(None),
+            env=_environment(),
         )
         return done.returncode, done.stderr.decode(errors="replace").splitlines()
 
@@ -165,10 +182,13 @@ def say(name: str, text: str) -> None:
     print(f"{start}{name:<11}{shown(text)}{end}", flush=True)
 
 
-def _environment(capture: Path | None) -> Mapping[str, str]:
+def _environment(capture: Path | None = None, modules: Path | None = None) -> Mapping[str, str]:
     tracing = _CAPTURE.format(escape(os.fspath(capture))) if capture is not None else ""
+    paths = [os.fspath(modules)] if modules is not None else []
+    paths += [given] if (given := os.environ.get("PYTHONPATH")) else []
     return {
         **os.environ,
+        "PYTHONPATH": os.pathsep.join(paths),
         "DDSI_URI": f"<DDSI>{_LOOPBACK.format(tracing)}</DDSI>",
         "CYCLONEDDS_URI": f"<CycloneDDS>{_LOOPBACK.format(_FIND_BY_UNICAST)}</CycloneDDS>",
         "PYTHONUNBUFFERED": "1",

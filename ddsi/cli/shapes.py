@@ -90,6 +90,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="with the identity and the rights in this folder, such as `ddsi keystore create` makes",
     )
+    parser.add_argument(
+        "--property",
+        type=_property,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a property of the participant, such as dds.sec.log.log_file=FILE; repeatable",
+    )
     qos = parser.add_argument_group("QoS")
     reliability = qos.add_mutually_exclusive_group()
     reliability.add_argument("-r", "--reliable", action="store_true", help="default for pub")
@@ -113,6 +121,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name for name in text.split(",") if name)
+
+
+def _property(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"a property is NAME=VALUE, not {text!r}")
+    return name, value
 
 
 def _rate(text: str) -> float:
@@ -148,9 +163,9 @@ class _Role:
 
     async def run(self) -> int:
         status: int = ExitStatus.OK
-        qos = Qos(entity_name=f"ddsi shapes {self.arguments.role}")
+        qos = Qos(entity_name=f"ddsi shapes {self.arguments.role}", properties=dict(self.arguments.property))
         if self.arguments.secure:
-            qos |= secure(self.arguments.secure)
+            qos = secure(self.arguments.secure) | qos
         try:
             async with DomainParticipant(self.arguments.domain, qos=qos) as participant, trio.open_nursery() as nursery:
                 nursery.start_soon(self.display.paint)

@@ -16,13 +16,12 @@ from ddsi.cli.demo_stage import Actor, Stage, open_stage
 from tests.examples.running import ROOT
 
 
-def actor(name: str, *, status: int = 0, refuses: bool = False, **received: int) -> Actor:
+def actor(name: str, *, status: int = 0, refuses: int = 0, **received: int) -> Actor:
     """One whose process has ended, after receiving so many squares of these colours."""
     made = Actor(name, cast(trio.Process, SimpleNamespace(returncode=status)), "received")
     for colour, count in received.items():
         made.counts["received", "Square", colour] = count
-    if refuses:
-        made.has_refused.set()
+    made.refusals = {f"reason {number}" for number in range(refuses)}
     return made
 
 
@@ -43,20 +42,24 @@ def test_an_actor_is_counted_by_what_it_says_and_heard_when_it_refuses(
 ) -> None:
     program = (
         "import sys; print('Square     RED        001 002 [30]'); print('READY');"
-        "print('ddsi shapes: refused participant 01dd:2:3:4: it is not signed', file=sys.stderr)"
+        "print('ddsi shapes: refused participant 01dd:2:3:4: it is not signed', file=sys.stderr);"
+        "print('ddsi shapes: Square: refused 01dd:2:3:5: no rule: none', file=sys.stderr);"
+        "print('ddsi shapes: Square: 1 writer matched', file=sys.stderr)"
     )
 
     async def play(stage: Stage) -> None:
         bob = await stage.start("bob", ["-c", program], verb="received")
+        await bob.wait_for_refusals(2)
         await bob.has_ended.wait()
         assert bob.counts == {("received", "Square", "RED"): 1}
         assert bob.is_ready.is_set()
-        assert bob.has_refused.is_set()
+        assert bob.refusals == {"it is not signed", "no rule: none"}
 
     on_stage(tmp_path, play)
     assert sorted(capsys.readouterr().out.splitlines()) == [
         "bob        received Square RED 001 002 [30]",
         "bob        refused  it is not signed",
+        "bob        refused  no rule: none",
     ]
 
 
@@ -92,15 +95,15 @@ def test_everybody_is_told_to_stay_on_the_loopback(tmp_path: Path, monkeypatch: 
 @pytest.mark.parametrize(
     ("bob", "flaws"),
     [
-        (actor("bob", GREEN=20, refuses=True), []),
-        (actor("bob", GREEN=19, refuses=True), ["bob received 19 of 20 samples of alice"]),
+        (actor("bob", GREEN=20, refuses=2), []),
+        (actor("bob", GREEN=19, refuses=2), ["bob received 19 of 20 samples of alice"]),
         (actor("bob", GREEN=19, RED=1), ["bob received 1 samples of mallory, who may not write"]),
-        (actor("bob", GREEN=20), ["bob did not refuse mallory"]),
-        (actor("bob", GREEN=20, refuses=True, status=1), ["bob ended with status 1"]),
+        (actor("bob", GREEN=20, refuses=1), ["bob refused 1 of 2 attempts of mallory"]),
+        (actor("bob", GREEN=20, refuses=2, status=1), ["bob ended with status 1"]),
     ],
 )
 def test_what_is_found_wanting(bob: Actor, flaws: list[str]) -> None:
-    assert _flaws(actor("alice"), bob, actor("mallory", status=-15)) == flaws
+    assert _flaws(actor("alice"), bob, [actor("mallory", status=-15), actor("mallory", status=-15)]) == flaws
 
 
 def scene(folder: Path, protected: bytes) -> SecuredScene:

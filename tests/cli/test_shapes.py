@@ -56,8 +56,10 @@ def test_partitions() -> None:
     assert _role().group_qos == Qos(partition=p.Partition())
 
 
-@pytest.mark.parametrize("words", [["-b", "-r"], ["--keep-last", "1", "--keep-all"], ["-x", "3"]])
-def test_options_that_exclude_each_other(words: list[str]) -> None:
+@pytest.mark.parametrize(
+    "words", [["-b", "-r"], ["--keep-last", "1", "--keep-all"], ["-x", "3"], ["--property", "name"]]
+)
+def test_options_that_are_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit):
         main(["shapes", "pub", *words])
 
