@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from .framework import Namespace, async_test, capture, namespace, scenario
+from .matrix import find_case
 from .matrix.dissection import OUR_PACKETS, complaints
 from .matrix.stories import Cast, Story, deliver, deliver_late
 from .peers.catalogue import CYCLONE_C, FAST_DDS, OURS
@@ -47,22 +48,36 @@ async def test_what_we_send_to_cyclone_is_well_formed(
     await check_our_packets(name, publisher, subscriber, tmp_path)
 
 
+@pytest.mark.parametrize("governance", ["encrypt-all", "sign-all", "all-origin"])
+@async_test
+async def test_what_we_protect_is_well_formed(governance: str, tmp_path: Path) -> None:
+    """Secured: the handshake, and all envelopes; what is signed only is read within them too."""
+    case = find_case(governance)
+    await run_and_check(case.story, case.publisher_options(), case.subscriber_options(), OURS, OURS, tmp_path)
+
+
 async def check_our_packets(name: str, publisher: Peer, subscriber: Peer, folder: Path) -> None:
+    story, options, changes = PLAYS[name]
+    await run_and_check(story, replace(options, **changes), options, publisher, subscriber, folder)
+
+
+async def run_and_check(
+    story: Story, written: Options, read: Options, publisher: Peer, subscriber: Peer, folder: Path
+) -> None:
     publisher.locate()
     subscriber.locate()
-    story, options, changes = PLAYS[name]
     with namespace() as host:
-        async with capture(host, folder / f"{name}.pcapng") as captured:
-            await play(story, options, changes, publisher, subscriber, host)
+        async with capture(host, folder / "run.pcapng") as captured:
+            await play(story, written, read, publisher, subscriber, host)
         assert captured.count(f"rtps && {OUR_PACKETS}") > 10
         assert complaints(captured) == []
 
 
 async def play(
-    story: Story, options: Options, changes: dict[str, Any], publisher: Peer, subscriber: Peer, host: Namespace
+    story: Story, written: Options, read: Options, publisher: Peer, subscriber: Peer, host: Namespace
 ) -> None:
     async with scenario(f"dissection of {publisher} to {subscriber}", deadline=60) as stage:
-        await story(Cast(stage, host, host, publisher, subscriber, replace(options, **changes), options))
+        await story(Cast(stage, host, host, publisher, subscriber, written, read))
 
 
 # --- that the check can fail -----------------------------------------------------------------------------------
@@ -119,7 +134,7 @@ async def test_others_do_raise_complaints(tmp_path: Path) -> None:
     FAST_DDS.locate()
     with namespace() as host:
         async with capture(host, tmp_path / "fastdds.pcapng") as captured:
-            await play(deliver, Options(keyless=True), {}, FAST_DDS, FAST_DDS, host)
+            await play(deliver, Options(keyless=True), Options(keyless=True), FAST_DDS, FAST_DDS, host)
         assert complaints(captured) == []
         assert complaints(captured, "rtps.vendorId == 0x010f") != []
 
