@@ -233,7 +233,8 @@ class AdmissionDesk:
             self._log(
                 LogLevel.WARNING_LEVEL, f"authentication of {remote.guid}: {reason}", "authentication", remote.guid
             )
-            self._effects.append(Decided(self._own.guid, remote.guid, Refused(reason)))
+            if remote.standing is Standing.PENDING:  # who was admitted is not refused for what others say in its name
+                self._effects.append(Decided(self._own.guid, remote.guid, Refused(reason)))
 
     def _failed(self, remote: RemoteParticipant, reason: str) -> None:
         if remote.standing is Standing.PENDING and self._own.attributes.allow_unauthenticated_participants:

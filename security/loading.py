@@ -22,7 +22,7 @@ from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.qos_policies import Properties
 
 from .conformance import objections
-from .data_tagging import PropertyDataTagging
+from .data_tagging import QosDataTagging
 from .plugins import (
     PLUGIN_VERSION,
     AccessControl,
@@ -113,7 +113,7 @@ def load_plugins(properties: Properties, *, entropy: Callable[[int], bytes], wal
         access_control=cast(AccessControl, access_control),
         cryptographic=cast(Cryptographic, cryptographic),
         logging=cast(Logging, logging),
-        data_tagging=PropertyDataTagging(),
+        data_tagging=QosDataTagging(),
     )
 
 

@@ -15,6 +15,7 @@ __all__ = [
     "BUILTIN_SECURE_TOPICS",
     "NEVER_IN_MESSAGES",
     "PLAIN_BUILTIN",
+    "SECURE_BUILTIN",
     "VOLATILE",
     "BuiltinSecureTopic",
     "LocalEndpoint",
@@ -50,6 +51,10 @@ BUILTIN_SECURE_TOPICS: Final = (
         "BuiltinParticipantVolatileMessageSecureWriter",
         "BuiltinParticipantVolatileMessageSecureReader",
     ),
+)
+
+SECURE_BUILTIN: Final = frozenset(
+    entity_id for topic in BUILTIN_SECURE_TOPICS for entity_id in (topic.writer_id, topic.reader_id)
 )
 
 VOLATILE: Final = {

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ddsi.structure.guid import Guid
-from ddsi.structure.qos_policies import Properties
+from ddsi.structure.qos import EndpointQos
 
 from .attributes import DataTags
 from .builtin_logging_type import BuiltinLoggingTypeV2, LogLevel
@@ -87,6 +87,6 @@ class DataTagging(Protocol):
     The OMG describes the plugin without giving it an operation; this one is ours, called when an endpoint is made.
     """
 
-    def get_data_tags(self, endpoint_properties: Properties) -> DataTags:
-        """The tags of an endpoint with these properties, in order; empty for none."""
+    def get_data_tags(self, qos: EndpointQos) -> DataTags:
+        """The tags of an endpoint with this QoS, in order; empty for none."""
         ...

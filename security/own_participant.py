@@ -133,7 +133,7 @@ class OwnParticipant:
         return tags
 
     def _tags(self, data: DiscoveredWriterData | DiscoveredReaderData) -> DataTags:
-        return self._plugins.data_tagging.get_data_tags(data.qos.properties)
+        return self._plugins.data_tagging.get_data_tags(data.qos)
 
     # --- builtin endpoints -------------------------------------------------------------------------------
 

@@ -19,7 +19,6 @@ __all__ = [
     "AUTH_PLUGIN",
     "BUILTIN_ENDPOINT_NAME",
     "CRYPTO_PLUGIN",
-    "DATA_TAG_PREFIX",
     "GOVERNANCE",
     "IDENTITY_CA",
     "IDENTITY_CERTIFICATE",
@@ -61,9 +60,6 @@ LOG_PLUGIN: Final = "dds.sec.log.plugin"
 
 BUILTIN_ENDPOINT_NAME: Final = "dds.sec.builtin_endpoint_name"
 """Given by the service with each builtin endpoint that it registers; never by a user (§8.8.8.1)."""
-
-DATA_TAG_PREFIX: Final = "dds.sec.data_tag."
-"""What begins the properties of an endpoint that are its data tags (§7.2.5); the rest of the name is the tag's."""
 
 _NAMES: Final = (
     *(IDENTITY_CA, IDENTITY_CERTIFICATE, PRIVATE_KEY, PASSWORD, IDENTITY_CRL, TRUSTED_CA_DIR),
@@ -117,8 +113,6 @@ def security_properties(properties: Properties) -> dict[str, str]:
     for name, value in properties.items():
         canonical = _canonical(name)
         if not canonical.startswith(SECURITY_PROPERTY_PREFIX) or canonical in _IGNORED:
-            continue
-        if canonical.startswith(DATA_TAG_PREFIX):  # read by the data tagging plugin
             continue
         if canonical not in _NAMES and not canonical.startswith(own):
             raise ConfigurationError(_unknown(name, canonical))

@@ -14,6 +14,7 @@ from typing import Final
 from ddsi.serialization import ParameterId
 from ddsi.spi import (
     ADMITTED,
+    PENDING,
     Admission,
     Announcement,
     Compute,
@@ -42,7 +43,7 @@ from .builtin_logging_type import LOG_TOPIC_NAME, LOG_TYPE_NAME, BuiltinLoggingT
 from .handshake import State
 from .key_exchange import KeyExchange
 from .loading import Plugins, load_plugins
-from .local_endpoint import LocalEndpoint
+from .local_endpoint import SECURE_BUILTIN, LocalEndpoint
 from .logging_plugin import LogLevel
 from .mailbox import Mailbox
 from .own_participant import OwnParticipant
@@ -164,6 +165,8 @@ class SecurityService:
         endpoint = self._own.endpoints[local]
         is_builtin = local.entity_id.is_builtin
         if participant.standing is Standing.UNAUTHENTICATED:
+            if endpoint.guid.entity_id in SECURE_BUILTIN:
+                return PENDING  # for ever: whatever it claims to have, it has no key, and need not be told
             refusal = None if is_builtin else _protected_refusal(endpoint, remote)
             return refusal or ADMITTED
         if participant.standing is not Standing.ADMITTED:

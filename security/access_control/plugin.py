@@ -16,7 +16,7 @@ from typing import Final
 
 from ddsi.spi import Refused
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
-from ddsi.structure.errors import MalformedMessage, NotAllowedBySecurity
+from ddsi.structure.errors import NotAllowedBySecurity
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import Partition, Properties
@@ -28,7 +28,6 @@ from ..handles import IdentityHandle, Pending, PermissionsHandle
 from ..properties import security_properties
 from ..tokens import AuthenticatedPeerCredentialToken, DataHolder, PermissionsCredentialToken, PermissionsToken
 from .checks import may_join, may_use_endpoint, may_use_topic
-from .data_tags import data_tags_of
 from .decision import Decision
 from .document_error import shown, titled
 from .permissions import ActionKind, Grant
@@ -363,11 +362,8 @@ class PermissionsAccessControl:
         data: DiscoveredWriterData | DiscoveredReaderData,
     ) -> Decision:
         handle = _remote(permissions_handle)
-        try:
-            tags = data_tags_of(data.security_parameters)
-        except MalformedMessage as error:
-            return Decision(False, f"the data tags of {data.guid} cannot be read: {error}")
-        return self._endpoint(handle.local, handle.grant, domain_id, kind, data.topic_name, data.qos.partition, tags)
+        partition, tags = data.qos.partition, data.qos.data_tags.tags
+        return self._endpoint(handle.local, handle.grant, domain_id, kind, data.topic_name, partition, tags)
 
 
 def _reserved(topic: str) -> Decision:

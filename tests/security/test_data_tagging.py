@@ -1,29 +1,15 @@
-"""The builtin DataTagging plugin."""
+"""Data tags are those of the endpoint's QoS."""
 
 from __future__ import annotations
 
-import pytest
-
-from ddsi.structure.errors import ConfigurationError
-from ddsi.structure.qos_policies import BinaryProperty, Properties, Property
-from ddsi_security.data_tagging import PropertyDataTagging
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.qos_policies import DataTags
+from ddsi_security.data_tagging import QosDataTagging
 from ddsi_security.plugins import DataTagging
 
 
-def test_tags_are_properties_in_their_order() -> None:
-    plugin: DataTagging = PropertyDataTagging()
-    properties: Properties = {
-        "dds.sec.data_tag.owner": "navy",
-        "application.name": "x",
-        "dds.sec.data_tag.classification": Property("secret", propagate=True),
-        "dds.sec.data_tag.empty": "",
-    }
-    assert plugin.get_data_tags(properties) == (("owner", "navy"), ("classification", "secret"), ("empty", ""))
-    assert plugin.get_data_tags({"application.name": "x"}) == ()
-
-
-def test_a_tag_has_a_name_and_a_text() -> None:
-    with pytest.raises(ConfigurationError, match=r"lacks the name of its tag: write dds\.sec\.data_tag\.NAME"):
-        PropertyDataTagging().get_data_tags({"dds.sec.data_tag.": "x"})
-    with pytest.raises(ConfigurationError, match="give it as a string"):
-        PropertyDataTagging().get_data_tags({"dds.sec.data_tag.owner": BinaryProperty(b"x")})
+def test_the_tags_of_the_policy_in_their_order() -> None:
+    plugin: DataTagging = QosDataTagging()
+    tags = (("owner", "navy"), ("classification", "secret"), ("empty", ""))
+    assert plugin.get_data_tags(EndpointQos(data_tags=DataTags(*tags))) == tags
+    assert plugin.get_data_tags(EndpointQos()) == ()

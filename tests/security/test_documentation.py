@@ -103,7 +103,6 @@ def test_names_and_numbers_are_those_of_the_code() -> None:
         f"the topic `{LOG_TOPIC_NAME}`",
         f"a message has at most {MAX_MESSAGE_LENGTH} characters",
         f"at most {MAX_EVENTS_PER_SECOND} events in a second",
-        f"begin with `{properties.DATA_TAG_PREFIX}`",
         f"`{LogTopic.__name__}.unwritten_count`",
     ):
         assert stated in WORDS

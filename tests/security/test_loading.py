@@ -12,7 +12,8 @@ from types import ModuleType
 import pytest
 
 from ddsi.structure.errors import ConfigurationError
-from ddsi.structure.qos_policies import Properties
+from ddsi.structure.qos import EndpointQos
+from ddsi.structure.qos_policies import DataTags, Properties
 from ddsi_security.loading import KINDS, PluginKind, Plugins, load_plugins
 from ddsi_security.plugins import AccessControl, Authentication, Cryptographic, Logging
 
@@ -88,7 +89,7 @@ def test_each_plugin_is_made_by_the_factory_that_its_property_names() -> None:
     assert isinstance(plugins.access_control, AcmeAccessControl)
     assert isinstance(plugins.cryptographic, AcmeCryptographic)
     assert isinstance(plugins.logging, Shelf.Logging)
-    assert plugins.data_tagging.get_data_tags({"dds.sec.data_tag.a": "b"}) == (("a", "b"),)
+    assert plugins.data_tagging.get_data_tags(EndpointQos(data_tags=DataTags(("a", "b")))) == (("a", "b"),)
     assert plugins.authentication.given == (ACME, bytes, int)
 
 

@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from ddsi.structure.qos import EndpointQos
 from ddsi_security import plugins
 from ddsi_security.plugins import DataTagging
 
@@ -94,8 +95,8 @@ def test_a_plugin_needs_no_base_class() -> None:
     """What mypy checks here is that a class with the right methods is a plugin."""
 
     class LabelledByOwner:
-        def get_data_tags(self, endpoint_properties: object) -> tuple[tuple[str, str], ...]:
+        def get_data_tags(self, qos: object) -> tuple[tuple[str, str], ...]:
             return (("owner", "me"),)
 
     plugin: DataTagging = LabelledByOwner()
-    assert plugin.get_data_tags({}) == (("owner", "me"),)
+    assert plugin.get_data_tags(EndpointQos()) == (("owner", "me"),)

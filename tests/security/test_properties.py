@@ -31,12 +31,6 @@ def test_what_only_others_understand_is_left_out() -> None:
     assert security_properties({"dds.sec.auth.library.path": "dds_security_auth", "app.name": "x"}) == {}
 
 
-def test_the_data_tags_of_an_endpoint_are_not_taken_for_misspelt_properties() -> None:
-    assert security_properties({"dds.sec.data_tag.owner": "navy", "dds.sec.crypto.keysize": "128"}) == {
-        "dds.sec.crypto.keysize": "128"
-    }
-
-
 def test_the_same_twice_is_accepted_and_two_values_are_not() -> None:
     both = {"dds.sec.auth.private_key": "file:a", "dds.sec.auth.builtin.PKI-DH.private_key": "file:a"}
     assert security_properties(both) == {"dds.sec.auth.private_key": "file:a"}

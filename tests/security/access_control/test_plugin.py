@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 import itertools
 from collections.abc import Mapping
@@ -18,9 +17,9 @@ from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReade
 from ddsi.structure.errors import ConfigurationError, NotAllowedBySecurity
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos import EndpointQos
+from ddsi.structure.qos_policies import DataTags as DataTagsPolicy
 from ddsi.structure.qos_policies import Partition
 from ddsi_security.access_control import PermissionsAccessControl
-from ddsi_security.access_control.data_tags import PID_DATA_TAGS, data_tags_of, data_tags_parameter
 from ddsi_security.access_control.document_error import DocumentError, UntrustedDocument
 from ddsi_security.access_control.sec_attributes import BUILTIN_TOPICS
 from ddsi_security.access_control.smime import sign_document
@@ -150,8 +149,7 @@ def writer(topic: str, *partitions: str, tags: DataTags = ()) -> DiscoveredWrite
         guid=GUID,
         topic_name=topic,
         type_name="T",
-        qos=EndpointQos(partition=Partition(*partitions)),
-        security_parameters=(data_tags_parameter(tags),) if tags else (),
+        qos=EndpointQos(partition=Partition(*partitions), data_tags=DataTagsPolicy(*tags)),
     )
 
 
@@ -468,22 +466,7 @@ def test_a_peer_without_an_allow_rule_for_the_domain_may_not_join() -> None:
         assert "its allow rules are for domains 1 to 230. Missing right: join domain 0" in refusal(party.admits(remote))
 
 
-@given(st.binary(max_size=60))
-def test_hostile_data_tags_are_refused_or_read(octets: bytes) -> None:
-    party, remote = _PARTY
-    data = dataclasses.replace(writer("T"), security_parameters=((PID_DATA_TAGS, octets),))
-    answer = party.plugin.check_remote_datawriter(remote, 0, data)
-    assert answer is None or isinstance(answer, Refused)
-
-
 _PARTY = (lambda party: (party, party.met(rules(publish="*"))))(Party())
-
-
-def test_data_tags_are_announced_and_read() -> None:
-    tags = (("level", "secret"), ("", "\u00e4"))
-    assert data_tags_of((data_tags_parameter(tags),)) == tags
-    assert data_tags_parameter((("a", "b"),))[1] == bytes.fromhex("01000000 02000000 6100 0000 02000000 6200")
-    assert data_tags_of(()) == ()
 
 
 def test_endless_partitions_are_refused() -> None:
