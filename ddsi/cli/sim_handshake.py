@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
             dropped=arguments.drop,
             started_ns=arguments.wall_clock(),
             width=terminal_width(),
-            ascii_only=not can_print("→✗…"),
+            ascii_only=not can_print("→✗§"),
             pause=_wait_for_enter if arguments.step and _is_watched() else None,
         )
         is_done = walk.run()

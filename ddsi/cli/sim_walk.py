@@ -13,10 +13,7 @@ from enum import Enum
 from typing import cast
 
 from ..messages.acknack import AckNack
-from ..messages.data import Data
 from ..messages.heartbeat import Heartbeat
-from ..serialization import ParameterId, ParameterList
-from ..serialization.encapsulation import HEADER_LENGTH, decode_encapsulation
 from ..simulation import Dice, Domain, LinkConditions
 from ..spi import SecurityHooks, load_hooks
 from ..structure import builtin_entity_ids as ids
@@ -25,11 +22,11 @@ from ..structure.qos import Qos
 from ..structure.qos_policies import KeepAll, Properties, Reliable
 from ..trace.event import TraceEvent
 from ..trace.events import Matched, SampleDelivered, SecurityEvent
-from ..trace.generic_message import GenericMessageOutline, generic_message_in
 from ..trace.names import Names
 from ..trace.reasons import SecurityStep
 from ..trace.wording import number_ranges, range_text
 from .sim_handshake_words import KINDS
+from .sim_messages import Message, message_of
 from .sim_seam import Said, WatchedHooks
 
 __all__ = ["Walk"]
@@ -43,11 +40,7 @@ _TOPIC = "Square"
 _QOS = Qos(reliability=Reliable(), history=KeepAll())
 _SAMPLE_OCTETS = 32
 _INDENT = " " * 22
-
-_DISCOVERY = frozenset(
-    {ids.SPDP_SECURE_WRITER, ids.SEDP_PUBLICATIONS_SECURE_WRITER, ids.SEDP_SUBSCRIPTIONS_SECURE_WRITER,
-     ids.SEDP_PUBLICATIONS_WRITER, ids.SEDP_SUBSCRIPTIONS_WRITER}
-)  # fmt: skip
+_CLAUSES = {"HEARTBEAT": "RTPS 2.5 §8.3.8.6; §8.5.1.9.2", "ACKNACK": "RTPS 2.5 §8.3.8.1; §8.5.1.9.3"}
 
 
 @dataclass(slots=True)
@@ -60,23 +53,11 @@ class _Side:
     cause: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Message:
-    """A message that counts.  ``identity``: the same for all that repeat it."""
-
-    number: int
-    kind: str
-    identity: tuple[object, ...]
-    said: Said
-    data: Data
-    outline: GenericMessageOutline | None
-
-
 @dataclass(slots=True)
 class _Loss:
     """What was lost, and what is known since: who noticed, and when it was said again."""
 
-    message: _Message
+    message: Message
     at: float
     sender: str
     receiver: str
@@ -101,7 +82,7 @@ class Walk:
     ) -> None:
         self._dropped = dropped
         self._width = width
-        self._arrow, self._cross = ("->", "x") if ascii_only else ("→", "✗")
+        self._arrow, self._cross, self._clause = ("->", "x", "clause ") if ascii_only else ("→", "✗", "§")
         self._pause = pause
         self._sides: dict[GuidPrefix, _Side] = {}
         self._names = Names()
@@ -147,7 +128,7 @@ class Walk:
         lower, higher = sorted((first, second), key=lambda node: node.guid)
         for node in (lower, higher):
             self._tell(f"{node.name} is {node.guid}")
-        self._tell(f"{lower.name} has the lower Guid and begins (§8.3.2.11.3).  § is DDS-Security 1.1.")
+        self._tell(f"{lower.name} has the lower Guid and begins (§8.3.2.11.3).  Clauses are of DDS-Security 1.1.")
         writer = first.writer(_TOPIC, _QOS)
         reader = second.reader(_TOPIC, _QOS)
         is_matched = self._live(lambda: bool(writer.matched_count and reader.matched_count))
@@ -155,7 +136,7 @@ class Walk:
             writer.write(_SAMPLE_OCTETS)
         is_done = is_matched and self._live(lambda: bool(reader.taken))
         loss = self._loss
-        if loss is not None and loss.message.kind in _RELIABLE:
+        if loss is not None and loss.message.is_reliable:
             is_done = is_done and self._live(lambda: loss.repeated_at is not None)
         self._live(lambda: False, _AFTERMATH_S)
         return self._conclude(is_done)
@@ -208,9 +189,10 @@ class Walk:
                 self._tell_result(side, f"refuses: {detail}")
             case Matched(local=local, topic_name=topic_name) if not local.entity_id.is_builtin:
                 role = "writer" if local.entity_id.is_writer else "reader"
-                self._tell_result(side, f"matches its {role} of {topic_name}: both sides' keys are there (§8.8.9)")
+                self._tell_result(side, f"matches its {role} of {topic_name}: no key is missing any more (§8.8.9)")
             case SampleDelivered(reader=reader) if not reader.entity_id.is_builtin:
-                self._tell_result(side, f"has the sample of {_TOPIC}, checked and decrypted (§8.5.1.9.5 to §8.5.1.9.9)")
+                opened = "what was protected is opened (§8.5.1.9.5 to §8.5.1.9.9)"
+                self._tell_result(side, f"has the sample of {_TOPIC}; {opened}")
 
     def _sent(self, sender: GuidPrefix, receiver: GuidPrefix, octets: bytes) -> bool:
         """A datagram is on its way; True to lose it."""
@@ -236,7 +218,7 @@ class Walk:
             self._watch_for_repair(side, said, messages)
         return is_lost
 
-    def _lose(self, messages: Sequence[_Message], side: _Side, other: _Side) -> None:
+    def _lose(self, messages: Sequence[Message], side: _Side, other: _Side) -> None:
         self._lost = {message.identity for message in messages}
         named = next(message for message in messages if self._dropped in (message.kind, message.number))
         self._loss = _Loss(named, self._domain.now, side.name, other.name)
@@ -244,35 +226,31 @@ class Walk:
         also = f", and {company} more in the same datagram" if company else ""
         self._tell(f"{self._cross} lost: {named.number}{also}.  Nobody knows yet.", indent=_INDENT)
 
-    def _watch_for_repair(self, side: _Side, said: Sequence[Said], messages: Sequence[_Message]) -> None:
+    def _watch_for_repair(self, side: _Side, said: Sequence[Said], messages: Sequence[Message]) -> None:
         loss = self._loss
         if loss is None or loss.repeated_at is not None:
             return
-        is_asked_for = side.name == loss.receiver and any(_asks_for(it.submessage, loss.message) for it in said)
+        is_asked_for = side.name == loss.receiver and any(loss.message.is_asked_for_by(it.submessage) for it in said)
         if is_asked_for and not loss.noticed:
             loss.noticed = f"{side.name}, which asks by ACKNACK at {self._domain.now:.6f} s"
         for message in messages:
             is_repeated = self._numbers[message.identity] < message.number
-            if is_repeated and not loss.noticed and loss.message.kind not in _RELIABLE:
+            if is_repeated and not loss.noticed and not loss.message.is_reliable:
                 loss.noticed = f"{side.name} at {self._domain.now:.6f} s ({_because(side.hooks.cause)})"
             if message.identity == loss.message.identity:
                 loss.repeated_at = self._domain.now
 
     # --- what is in a datagram ---------------------------------------------------------------------------
 
-    def _messages(self, said: Sequence[Said]) -> list[_Message]:
+    def _messages(self, said: Sequence[Said]) -> list[Message]:
         """Those that count, numbered; an announcement that has arrived before is none."""
         messages = []
         for it in said:
-            if not isinstance(it.submessage, Data):
-                continue
-            outline = generic_message_in(it.submessage)
-            kind = _kind(it.submessage, outline)
-            identity = _identity(it, kind, outline)
-            if kind not in KINDS or (kind == "announcement" and identity in self._arrived):
+            message = message_of(it, self._count + 1)
+            if message is None or (message.kind == "announcement" and message.identity in self._arrived):
                 continue
             self._count += 1
-            messages.append(_Message(self._count, kind, identity, it, it.submessage, outline))
+            messages.append(message)
         return messages
 
     def _notes(self, said: Sequence[Said]) -> list[str]:
@@ -285,12 +263,12 @@ class Walk:
             topic = self._names.entity(it.sender.prefix, it.sender.entity_id)
             match it.submessage:
                 case Heartbeat(first_sn=first, last_sn=last) if last >= first:
-                    notes[it.sender, "HEARTBEAT"] = f"HEARTBEAT of {topic}: I have {range_text(first, last)}"
+                    notes[it.sender, "HEARTBEAT"] = f"HEARTBEAT of {topic} has {range_text(first, last)}"
                 case AckNack(reader_sn_state=wanted) if wanted:
-                    notes[it.sender, "ACKNACK"] = f"ACKNACK of {topic}: {number_ranges(wanted)} are missing here"
+                    notes[it.sender, "ACKNACK"] = f"ACKNACK of {topic} lacks {number_ranges(wanted)}"
                 case AckNack(reader_sn_state=wanted) if wanted.base > 1:
-                    notes[it.sender, "ACKNACK"] = f"ACKNACK of {topic}: I have all before {wanted.base}"
-        return list(notes.values())
+                    notes[it.sender, "ACKNACK"] = f"ACKNACK of {topic} has all before {wanted.base}"
+        return [f"{text}  [{_CLAUSES[name]}]" for (_, name), text in notes.items()]
 
     def _is_worth_a_note(self, writer: EntityId) -> bool:
         if not writer.is_builtin or writer == ids.PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER:
@@ -299,21 +277,19 @@ class Walk:
 
     # --- telling -----------------------------------------------------------------------------------------
 
-    def _tell_message(self, message: _Message, side: _Side) -> None:
+    def _tell_message(self, message: Message, side: _Side) -> None:
         kind = KINDS[message.kind]
         number = f"{message.number:>18}  "
-        self._tell(f"{kind.title}{self._about(message)}{self._again(message, side)}", indent=number)
+        self._tell(f"{kind.title}{self._about(message)}{self._again(message, side)}  [{kind.clause}]", indent=number)
         self._numbers.setdefault(message.identity, message.number)
         if message.kind in self._explained:
             return
         self._explained.add(message.kind)
-        self._tell(f"{kind.clause}: {kind.purpose}", indent=_INDENT)
-        holds = _holds(message)
-        if holds:
-            self._tell(holds, indent=_INDENT)
-        self._tell(_protection(message), indent=_INDENT)
+        for text in (kind.purpose, message.contents(), message.protection()):
+            if text:
+                self._tell(text, indent=_INDENT)
 
-    def _about(self, message: _Message) -> str:
+    def _about(self, message: Message) -> str:
         """Which endpoint it concerns."""
         sender = message.said.sender
         if message.kind in ("discovery", "data"):
@@ -323,11 +299,11 @@ class Walk:
             return f" for {self._names.entity(source.prefix, source.entity_id)}"
         return ""
 
-    def _again(self, message: _Message, side: _Side) -> str:
+    def _again(self, message: Message, side: _Side) -> str:
         before = self._numbers.get(message.identity)
         if before is None:
             return ""
-        why = "" if message.kind in _RELIABLE else f" ({_because(side.hooks.cause)})"
+        why = "" if message.is_reliable else f" ({_because(side.hooks.cause)})"
         return f"{why}: {before} again{', which was lost' if message.identity in self._lost else ''}"
 
     def _tell_states(self) -> None:
@@ -342,73 +318,16 @@ class Walk:
 
     def _tell(self, text: str, *, indent: str = "") -> None:
         lines = textwrap.wrap(
-            text, self._width, initial_indent=indent, subsequent_indent=_INDENT if indent else "",
+            text.replace("§", self._clause),
+            self._width,
+            initial_indent=indent,
+            subsequent_indent=_INDENT if indent else "",
             break_long_words=False,
-        )  # fmt: skip
+        )
         print("\n".join(lines), flush=True)
-
-
-_SECURITY_PIDS = (ParameterId.IDENTITY_TOKEN, ParameterId.PERMISSIONS_TOKEN, ParameterId.PARTICIPANT_SECURITY_INFO)
-_RELIABLE = frozenset({"participant-tokens", "writer-tokens", "reader-tokens", "discovery", "data"})
-
-
-def _kind(data: Data, outline: GenericMessageOutline | None) -> str:
-    """Its name in KINDS; any other for what does not count."""
-    if outline is not None:
-        return outline.kind
-    if data.writer_id == ids.SPDP_WRITER:
-        return "announcement"
-    if data.writer_id in _DISCOVERY:
-        return "discovery"
-    return "other" if data.writer_id.is_builtin else "data"
-
-
-def _identity(said: Said, kind: str, outline: GenericMessageOutline | None) -> tuple[object, ...]:
-    """On reliable topics a sample keeps its number; on the stateless one it gets a new one each time."""
-    if kind in _RELIABLE:
-        assert isinstance(said.submessage, Data)
-        return said.sender, said.submessage.writer_sn
-    return said.sender, kind, outline.fingerprint if outline is not None else 0
-
-
-def _asks_for(submessage: object, message: _Message) -> bool:
-    return (
-        isinstance(submessage, AckNack)
-        and submessage.writer_id == message.data.writer_id
-        and message.data.writer_sn in submessage.reader_sn_state
-    )
 
 
 def _because(cause: str) -> str:
     if cause in KINDS:
         return f"the {KINDS[cause].title} came"
-    return "it has seen the announcement" if cause == "the announcement" else cause
-
-
-def _holds(message: _Message) -> str:
-    """Names and sizes of what the token is made of."""
-    if message.kind == "announcement":
-        return _announced(message.data)
-    if message.outline is None:
-        return ""
-    tokens = []
-    for token in message.outline.tokens:
-        sizes = ", ".join(f"{name} {size}" for name, size in token.sizes)
-        tokens.append(f"{token.class_id} with {sizes}")
-    return f"{message.outline.octets} octets: {'; '.join(tokens)} octets"
-
-
-def _announced(data: Data) -> str:
-    """Which parameters of an announcement are for security, with their sizes."""
-    parameters, _ = ParameterList.decode(
-        data.serialized_payload,
-        little_endian=decode_encapsulation(data.serialized_payload).encapsulation.little_endian,
-        start=HEADER_LENGTH,
-    )
-    sizes = [f"{pid.name} {len(value)}" for pid in _SECURITY_PIDS if (value := parameters.get(pid)) is not None]
-    return f"{len(data.serialized_payload)} octets, among them {', '.join(sizes)}" if sizes else ""
-
-
-def _protection(message: _Message) -> str:
-    layers = message.said.protected
-    return f"protected: {', '.join(layers)}" if layers else "in clear"
+    return "it has seen the other's announcement" if cause == "the announcement" else cause

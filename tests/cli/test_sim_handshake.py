@@ -51,7 +51,7 @@ def test_the_same_seed_and_keystore_say_the_same(keystore: Path, capsys: pytest.
 @pytest.mark.parametrize(
     ("message", "noticed", "again"),
     [
-        ("announcement", r"alice at .* \(it has seen the announcement\)", True),
+        ("announcement", r"alice at .* \(it has seen the other's announcement\)", True),
         ("auth-request", "", False),
         ("request", r"alice at .* \(its timer in AWAIT_REPLY\)", True),
         ("reply", r"(alice|bob) at .* \(its timer in (AWAIT_REPLY|AWAIT_FINAL)\)", True),
@@ -92,13 +92,22 @@ def test_every_rule_has_its_clause() -> None:
 
 def test_a_message_is_lost_by_its_number_too(keystore: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = walked(keystore, capsys)
-    (number,) = re.findall(r"^ +(\d+)  keys of a writer for Square$", whole, re.M)
+    (number,) = re.findall(r"^ +(\d+)  keys of a writer for Square  ", whole, re.M)
     said = walked(keystore, capsys, "--drop", number)
     assert f"keys of a writer for Square: {number} again, which was lost" in said
 
 
 def test_what_is_never_sent_is_never_lost(keystore: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "No message 999 was sent" in walked(keystore, capsys, "--drop", "999", status=1)
+
+
+def test_a_narrow_encoding_gets_ascii(
+    keystore: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sim_handshake, "can_print", lambda text: False)
+    said = walked(keystore, capsys, "--drop", "data")
+    assert said.isascii()
+    assert "clause 8.3.2.11.4" in said
 
 
 def test_a_keystore_is_made_where_none_is_given(capsys: pytest.CaptureFixture[str]) -> None:
