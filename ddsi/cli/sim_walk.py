@@ -14,7 +14,7 @@ from typing import cast
 
 from ..messages.acknack import AckNack
 from ..messages.heartbeat import Heartbeat
-from ..simulation import Dice, Domain, LinkConditions
+from ..simulation import Domain, LinkConditions
 from ..spi import SecurityHooks, load_hooks
 from ..structure import builtin_entity_ids as ids
 from ..structure.guid import EntityId, Guid, GuidPrefix
@@ -94,12 +94,11 @@ class Walk:
         self._lost: set[tuple[object, ...]] = set()
         self._domain = Domain(seed, conditions=LinkConditions(delay=_DELAY_S), trace=self._notice)
         self._domain.network.loses = lambda sender, receiver, octets: True  # until both are there
-        dice = Dice(seed)
         for name, properties in identities.items():
-            self._join(name, properties, dice.fork(), started_ns)
+            self._join(name, properties, started_ns)
         self._domain.network.loses = self._sent
 
-    def _join(self, name: str, properties: Properties, dice: Dice, started_ns: int) -> None:
+    def _join(self, name: str, properties: Properties, started_ns: int) -> None:
         side: _Side
 
         def moved(before: Enum | None, after: Enum, cause: str) -> None:
@@ -110,7 +109,7 @@ class Walk:
 
         inner = load_hooks(
             properties,
-            entropy=dice.octets,
+            entropy=self._domain.dice.fork().octets,
             wall_clock=lambda: started_ns + int(self._domain.now * 1e9),
         )
         side = _Side(name, WatchedHooks(inner, moved))
