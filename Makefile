@@ -8,6 +8,9 @@ BIN := $(VENV)/bin
 PACKAGES := $(wildcard ddsi tests multiproc_tests examples benchmarks)
 TYPED := $(PACKAGES) typings/ddsi_security
 
+# A test file stays in one worker, as what its tests share is made once.  Real processes are not tested in parallel.
+IN_PARALLEL := -n auto --dist loadfile
+
 # Tests and the demo stay on this host, whatever the machine is connected to.
 export DDSI_URI := <DDSI><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></DDSI>
 export CYCLONEDDS_URI := <CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></CycloneDDS>
@@ -23,10 +26,11 @@ demo: $(VENV)/.ready-to-run  ## Live data between processes, under a minute
 	$(BIN)/ddsi demo
 
 test: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers $(VENV)/.ready-to-lint  ## All tests; those with other stacks where these are installed
-	$(BIN)/python -m pytest $(wildcard tests multiproc_tests) $(ARGS)
+	$(BIN)/python -m pytest $(IN_PARALLEL) $(wildcard tests) $(ARGS)
+	$(BIN)/python -m pytest $(wildcard multiproc_tests) $(ARGS)
 
 quick: $(VENV)/.ready-to-test  ## The tests that take milliseconds, without other processes
-	$(BIN)/python -m pytest -m "not slow and not peers" tests $(ARGS)
+	$(BIN)/python -m pytest $(IN_PARALLEL) -m "not slow and not peers" tests $(ARGS)
 
 lint: $(VENV)/.ready-to-lint  ## ruff, mypy, pyright
 	$(BIN)/ruff check
