@@ -308,6 +308,22 @@ async def test_links_are_cut_and_healed_and_the_weather_changes() -> None:
         relay.cut("a", "nobody")
 
 
+@async_test
+async def test_packets_that_hold_certain_octets_are_dropped() -> None:
+    """So many of them as was said, and no others."""
+    with relayed_namespaces("a", "b") as (hosts, relay):
+        relay.drop(b"bad", 2)
+        async with scenario("drop", deadline=20) as stage:
+            receiver = await start_receiver(stage, hosts["b"])
+            sender = await start_sender(stage, hosts["a"], hosts["b"].address)
+            for word in ("good", "bad", "bad", "bad", "last"):
+                await sender.send(word)
+                await sender.expect("SENT")
+            await receiver.expect("GOT last 0")
+            assert [match[1] for match in receiver.matches(r"GOT (\w+) 0")] == ["good", "bad", "last"]
+    assert relay.dropped == 2
+
+
 async def wait_until_relayed(relay: Relay, word: str) -> None:
     number = ["one", "two", "three", "four"].index(word) + 1
     deadline = time.monotonic() + 5

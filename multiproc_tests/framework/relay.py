@@ -45,13 +45,16 @@ class Relay:
     """The switch between the ends, and the weather on each link.
 
     ``links`` holds one Link for each ordered pair of names, ``links["a", "b"]`` for what a sends to b.
-    ``unreachable`` counts copies that an end did not take because its interface was down.
+    ``unreachable`` counts copies that an end did not take because its interface was down, ``dropped`` the packets that
+    :meth:`drop` was told of.
     """
 
     def __init__(self, ends: list[_End], *, weather: Weather, seed: int) -> None:
         now = time.monotonic()
         self.seed = seed
         self.unreachable = 0
+        self.dropped = 0
+        self._wanted: dict[bytes, int] = {}
         self.links = {
             (a.name, b.name): Link(a.name, b.name, weather=weather, seed=seed, now=now)
             for a, b in itertools.permutations(ends, 2)
@@ -86,11 +89,17 @@ class Relay:
             for link in self._chosen(source, destination):
                 link.is_cut = False
 
+    def drop(self, octets: bytes, count: int = 1) -> None:
+        """Loses the next ``count`` packets that hold these octets, on whatever link, before the weather sees them."""
+        with self._lock:
+            self._wanted[octets] = count
+
     def report(self) -> str:
         """The seed, and one line of counters for each link."""
         with self._lock:
             lines = [f"{link.name}: {link.counters}" for link in self.links.values()]
-        return "\n".join([f"relay, seed {self.seed}, unreachable={self.unreachable}", *lines])
+        head = f"relay, seed {self.seed}, unreachable={self.unreachable} dropped={self.dropped}"
+        return "\n".join([head, *lines])
 
     def _chosen(self, source: str | None, destination: str | None) -> list[Link]:
         chosen = [
@@ -154,6 +163,8 @@ class Relay:
             return
         link = self.links[source.name, destination.name]
         with self._lock:
+            if self._is_wanted(frame):
+                return
             arrivals = link.fate(len(frame), now)
         for arrival in arrivals:
             if arrival <= now and not self._on_the_way:
@@ -162,6 +173,14 @@ class Relay:
                 heapq.heappush(self._on_the_way, (arrival, next(self._order), destination, frame))
             else:
                 link.counters.overflowed += 1
+
+    def _is_wanted(self, frame: bytes) -> bool:
+        for octets, count in self._wanted.items():
+            if count and octets in frame:
+                self._wanted[octets] = count - 1
+                self.dropped += 1
+                return True
+        return False
 
     def _deliver_due(self) -> None:
         now = time.monotonic()
