@@ -7,6 +7,8 @@ nor answered again and again.  Who was once authenticated is never taken for una
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import math
 from collections.abc import Callable
 from typing import Final
@@ -64,6 +66,8 @@ class AdmissionDesk:
         self._participant_data = b""
         self._jobs: dict[int, tuple[Guid, Callable[[object, float], None]]] = {}
         self._generation = 0
+        self._timers: list[tuple[float, int, RemoteParticipant]] = []
+        self._timer_numbers = itertools.count()
         self._banned: dict[Guid, str] = {}
         plugins.authentication.set_listener(self)
         plugins.access_control.set_listener(self)
@@ -176,27 +180,45 @@ class AdmissionDesk:
             remote.renewal_asked = (now, remote.opened)
         return now - remote.renewal_asked[0] >= _FORGOTTEN_AFTER_S
 
+    def confirmed(self, remote: RemoteParticipant) -> None:
+        """It wrote something under the secret that the two share."""
+        if remote.handshake is not None:
+            remote.handshake.confirm()
+            self._arm(remote)
+
     def computed(self, effect: Compute, result: object, now: float) -> None:
         _, proceed = self._jobs.pop(effect.generation, (None, None))
         if proceed is not None:
             proceed(result, now)
 
     def handle_timeout(self, now: float) -> None:
-        for remote in list(self._remotes.values()):
+        while self.next_deadline() <= now:
+            _, _, remote = heapq.heappop(self._timers)
+            remote.due = math.inf
             for handshake in (remote.handshake, remote.renewal):
                 if handshake is not None and handshake.next_deadline() <= now:
                     self._act(remote, handshake, handshake.handle_timeout(now), now)
+            self._arm(remote)
 
     def next_deadline(self) -> float:
-        return min(
-            (
-                handshake.next_deadline()
-                for remote in self._remotes.values()
-                for handshake in (remote.handshake, remote.renewal)
-                if handshake is not None
-            ),
-            default=math.inf,
+        """Of all handshakes.  A crowd of strangers makes many, so nothing here takes longer the more there are."""
+        timers = self._timers
+        while timers:
+            due, _, remote = timers[0]
+            if due == remote.due and self._remotes.get(remote.guid.prefix) is remote:
+                return due
+            heapq.heappop(timers)  # it has another deadline by now, or is gone
+        return math.inf
+
+    def _arm(self, remote: RemoteParticipant) -> None:
+        due = min(
+            handshake.next_deadline() if handshake is not None else math.inf
+            for handshake in (remote.handshake, remote.renewal)
         )
+        if due != remote.due:
+            remote.due = due
+            if due != math.inf:
+                heapq.heappush(self._timers, (due, next(self._timer_numbers), remote))
 
     def _act(self, remote: RemoteParticipant, handshake: Handshake, outputs: list[Output], now: float) -> None:
         for output in outputs:
@@ -214,6 +236,7 @@ class AdmissionDesk:
                     remote.renewal = None
                 case Failed(reason, _):
                     self._failed(remote, reason)
+        self._arm(remote)
 
     def _worked(self, remote: RemoteParticipant, handshake: Handshake, result: object, now: float) -> None:
         if handshake in (remote.handshake, remote.renewal):  # else it was overtaken

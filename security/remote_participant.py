@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -26,7 +27,7 @@ class Standing(Enum):
 
 @dataclass(slots=True)
 class RemoteParticipant:
-    """``opened`` counts what was opened with its keys.
+    """``opened`` counts what was opened with its keys; ``due`` is when one of its handshakes wants to be called.
 
     ``renewal``: another handshake, that will take the first one's place, as the peer has lost what it knew of us.  Who
     says so in its name cannot prove it: ``renewal_asked`` is when that was said first, and what ``opened`` was then.
@@ -45,6 +46,7 @@ class RemoteParticipant:
     crypto: ParticipantCryptoHandle | None = None
     has_keys: bool = False
     opened: int = 0
+    due: float = math.inf
     early: dict[tuple[Guid, Guid], tuple[GenericMessage, float]] = field(default_factory=dict)
 
     @property

@@ -220,8 +220,7 @@ class SecurityService:
         if change.writer_guid.entity_id == ids.PARTICIPANT_STATELESS_MESSAGE_WRITER:
             self._desk.receive(remote, message, now)
         elif remote.standing is Standing.ADMITTED:
-            if remote.handshake is not None:
-                remote.handshake.confirm()
+            self._desk.confirmed(remote)
             refusal = self._keys.receive(remote, message, now)
             self._protection.changed()
             if refusal is not None:

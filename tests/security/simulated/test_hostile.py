@@ -262,6 +262,7 @@ def test_handshakes_with_a_stolen_certificate(identities: dict[str, list[Propert
 # --- too much of everything -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_flood_of_participants_that_want_to_be_authenticated(identities: dict[str, list[Properties]]) -> None:
     scene = Scene(identities["encrypt"])
     data = scene.alice.engine.discovery.data
