@@ -29,8 +29,11 @@ class ReaderAdmission:
 class AccessControlListener(Protocol):
     """Hears what happens to permissions; implemented by the service.  Called from handle_timeout only (§8.4.2.9.19)."""
 
-    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle) -> None:
-        """They expired: close the local participant, or forget the remote one."""
+    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle, ended_at: int) -> None:
+        """They expired: close the local participant, or forget the remote one.
+
+        ``ended_at``: since when, in nanoseconds since 1970.
+        """
         ...
 
 

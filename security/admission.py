@@ -11,6 +11,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Callable
+from datetime import datetime, timedelta
 from typing import Final
 
 from ddsi.serialization import ParameterId
@@ -390,31 +391,34 @@ class AdmissionDesk:
 
     # --- what ends while it is used ----------------------------------------------------------------------
 
-    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle) -> None:
-        self._revoked(
-            "the identity certificate of", lambda remote: _identity_of(remote) is handle, handle is self._own.identity
-        )
+    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle, ended_at: int) -> None:
+        what = f"the identity certificate ended at {_utc(ended_at)}"
+        self._revoked(what, lambda remote: _identity_of(remote) is handle, is_ours=handle is self._own.identity)
 
     def on_status_changed(self, plugin: Authentication, handle: IdentityHandle, status_kind: AuthStatusKind) -> None:
         """The status token goes with the next announcement."""
 
-    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle) -> None:
-        self._revoked(
-            "the permissions of", lambda remote: remote.permissions is handle, handle is self._own.permissions
-        )
+    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle, ended_at: int) -> None:
+        what = f"the permissions ended at {_utc(ended_at)}"
+        self._revoked(what, lambda remote: remote.permissions is handle, is_ours=handle is self._own.permissions)
 
-    def _revoked(self, what: str, concerns: Callable[[RemoteParticipant], bool], is_ours: bool) -> None:
+    def _revoked(self, what: str, concerns: Callable[[RemoteParticipant], bool], *, is_ours: bool) -> None:
         if is_ours:
-            reason = f"{what} this participant have ended: renew them and create it anew"
+            reason = f"{what}: renew what has ended, and create the participant anew"
             self._log(LogLevel.CRITICAL_LEVEL, reason, "revoked")
             self._effects.append(Revoked(reason))
             return
         for remote in list(self._remotes.values()):
             if concerns(remote):
-                self._refuse(remote, f"{what} {remote.guid} have ended")
+                self._refuse(remote, what)
 
     def _log(self, level: LogLevel, text: str, category: str, entity: Guid | None = None) -> None:
         self._plugins.logging.log(level, text, category, entity=entity)
+
+
+def _utc(nanoseconds: int) -> str:
+    """A time since 1970, to the second."""
+    return (datetime(1970, 1, 1) + timedelta(seconds=nanoseconds // 10**9)).isoformat() + "Z"
 
 
 def _identity_of(remote: RemoteParticipant) -> IdentityHandle | None:

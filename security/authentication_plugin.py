@@ -77,8 +77,11 @@ class AuthStatusKind(IntEnum):
 class AuthenticationListener(Protocol):
     """Hears what happens to identities; implemented by the service.  Called from handle_timeout only (§8.3.2.11.12)."""
 
-    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle) -> None:
-        """The identity expired or was revoked: close the local participant, or forget the remote one."""
+    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle, ended_at: int) -> None:
+        """The identity expired or was revoked: close the local participant, or forget the remote one.
+
+        ``ended_at``: since when, in nanoseconds since 1970.
+        """
         ...
 
     def on_status_changed(self, plugin: Authentication, handle: IdentityHandle, status_kind: AuthStatusKind) -> None:

@@ -299,10 +299,10 @@ class PermissionsAccessControl:
     def handle_timeout(self) -> None:
         now = self._wall_clock()
         while (deadline := self.next_deadline()) is not None and deadline <= now:
-            _, _, handle = heapq.heappop(self._expiries)
+            not_after, _, handle = heapq.heappop(self._expiries)
             del self._watched[handle]
             if self._listener is not None:
-                self._listener.on_revoke_permissions(self, handle)
+                self._listener.on_revoke_permissions(self, handle, not_after)
 
     def _watch(self, handle: PermissionsHandle, grant: Grant) -> None:
         if handle in self._watched:

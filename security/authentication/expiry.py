@@ -39,11 +39,11 @@ class ExpiryWatch:
             heapq.heappop(self._heap)
         return self._heap[0][0] if self._heap else None
 
-    def pop(self, now: int) -> IdentityHandle | None:
-        """One that has expired by now, if any; it is told once."""
+    def pop(self, now: int) -> tuple[IdentityHandle, int] | None:
+        """One that has expired by now, if any, and when; it is told once."""
         valid_until = self.next()
         if valid_until is None or now < valid_until:
             return None
         handle = heapq.heappop(self._heap)[2]
         self.forget(handle)
-        return handle
+        return handle, valid_until

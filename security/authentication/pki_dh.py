@@ -262,9 +262,9 @@ class PkiDhAuthentication:
 
     def handle_timeout(self) -> None:
         now = self._wall_clock()
-        while (handle := self._expiries.pop(now)) is not None:
+        while (expired := self._expiries.pop(now)) is not None:
             if self._listener is not None:
-                self._listener.on_revoke_identity(self, handle)
+                self._listener.on_revoke_identity(self, *expired)
 
 
 def _identity_token(material: IdentityMaterial) -> IdentityToken:

@@ -416,8 +416,11 @@ def test_what_expires_is_taken_out_as_an_event() -> None:
     alice.clock_ns = NOW_NS + 20 * 365 * 86_400 * 10**9
     alice.hooks.handle_timeout(alice.hooks.next_deadline())
     alice.act()
-    assert alice.revoked
-    assert isinstance(alice.decided[(alice.guid, bob.guid)], Refused)
+    (reason, *_) = alice.revoked
+    assert reason.startswith("the identity certificate ended at 2036-11-19T00:28:0")
+    refusal = alice.decided[(alice.guid, bob.guid)]
+    assert isinstance(refusal, Refused)
+    assert "ended at 2036-11-19T" in refusal.reason
     assert isinstance(alice.hooks.remote_participant(bob.data, 1.0), Refused), "nor is it asked again"
 
 

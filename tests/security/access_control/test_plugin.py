@@ -606,9 +606,11 @@ def test_participants_of_one_process_have_rights_of_their_own() -> None:
 class Listener:
     def __init__(self) -> None:
         self.revoked: list[PermissionsHandle] = []
+        self.ended_at: list[int] = []
 
-    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle) -> None:
+    def on_revoke_permissions(self, plugin: AccessControl, handle: PermissionsHandle, ended_at: int) -> None:
         self.revoked.append(handle)
+        self.ended_at.append(ended_at)
         plugin.return_permissions_handle(handle)
 
 
@@ -635,6 +637,7 @@ def test_permissions_expire_one_after_the_other() -> None:
     assert "expired at 2037-12-31" in refusal(party.joins())
     party.plugin.handle_timeout()
     assert listener.revoked == [remote, party.local]
+    assert listener.ended_at == [deadline, END]
     assert party.plugin.next_deadline() is None
 
 

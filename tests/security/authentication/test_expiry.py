@@ -28,9 +28,11 @@ class Heard:
 
     def __init__(self) -> None:
         self.revoked: list[IdentityHandle] = []
+        self.ended_at: list[int] = []
 
-    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle) -> None:
+    def on_revoke_identity(self, plugin: Authentication, handle: IdentityHandle, ended_at: int) -> None:
         self.revoked.append(handle)
+        self.ended_at.append(ended_at)
 
     def on_status_changed(self, plugin: Authentication, handle: IdentityHandle, status_kind: AuthStatusKind) -> None:
         raise AssertionError("there is no status that could change")
@@ -68,6 +70,7 @@ def test_a_peer_and_then_we_expire() -> None:
     clock.seconds = NOW_S + 9999
     plugin.handle_timeout()
     assert heard.revoked == [both.replier_seen, both.initiator.identity]
+    assert heard.ended_at == [(NOW_S + 1801) * SECOND, (NOW_S + 3601) * SECOND]
     assert plugin.next_deadline() is None
 
 
@@ -113,5 +116,5 @@ def test_watching_is_lazy_and_in_order() -> None:
     assert watch.next() == 20
     assert watch.pop(19) is None
     popped = [watch.pop(45) for _ in range(4)]
-    assert popped == [handles[1], handles[4], handles[2], None]
+    assert popped == [(handles[1], 20), (handles[4], 30), (handles[2], 40), None]
     assert watch.next() == 50
