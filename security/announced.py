@@ -26,9 +26,11 @@ from .tokens import NIL, DataHolder, read_data_holder, write_data_holder
 __all__ = [
     "SecurityInfo",
     "endpoint_info",
+    "endpoint_refusal",
+    "info",
     "info_parameter",
-    "info_refusal",
     "participant_info",
+    "participant_refusal",
     "token",
     "token_parameter",
 ]
@@ -83,7 +85,15 @@ def token(parameters: Iterable[Parameter], parameter_id: ParameterId) -> DataHol
     return NIL
 
 
-def info_refusal(ours: SecurityInfo, theirs: SecurityInfo, names: type[IntFlag]) -> str:
+def participant_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:
+    return _info_refusal(ours, theirs, ParticipantSecurityAttributesMask)
+
+
+def endpoint_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:
+    return _info_refusal(ours, theirs, EndpointSecurityAttributesMask)
+
+
+def _info_refusal(ours: SecurityInfo, theirs: SecurityInfo, names: type[IntFlag]) -> str:
     """Why two announcements do not go together; empty if they do.
 
     Each of the two masks counts only where both sides declare it valid, and must then be the same (§7.4.1.5).
@@ -95,14 +105,6 @@ def info_refusal(ours: SecurityInfo, theirs: SecurityInfo, names: type[IntFlag])
         if our_mask & their_mask & _VALID and our_mask != their_mask:
             return f"ours has {_names(our_mask, flags)}, the peer's {_names(their_mask, flags)}"
     return ""
-
-
-def participant_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:
-    return info_refusal(ours, theirs, ParticipantSecurityAttributesMask)
-
-
-def endpoint_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:
-    return info_refusal(ours, theirs, EndpointSecurityAttributesMask)
 
 
 def _names(mask: int, flags: type[IntFlag] | None) -> str:

@@ -18,7 +18,7 @@ from ddsi.structure.qos_policies import Partition, Properties
 
 from .announced import endpoint_info, info_parameter, participant_info, token_parameter
 from .attributes import DataTags, EndpointSecurityAttributes
-from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, Pending
+from .handles import Pending
 from .loading import Plugins
 from .local_endpoint import BUILTIN_SECURE_TOPICS, PLAIN_BUILTIN, LocalEndpoint
 from .properties import BUILTIN_ENDPOINT_NAME
@@ -163,18 +163,6 @@ class OwnParticipant:
         for entity_id in sorted(PLAIN_BUILTIN):
             guid = Guid.of(self.guid.prefix, entity_id)
             self.endpoints[guid] = LocalEndpoint(guid, "", EndpointSecurityAttributes())
-
-    def close(self) -> None:
-        """Wipe what can be wiped."""
-        for endpoint in self.endpoints.values():
-            if isinstance(endpoint.handle, DatawriterCryptoHandle):
-                self._plugins.cryptographic.unregister_datawriter(endpoint.handle)
-            elif isinstance(endpoint.handle, DatareaderCryptoHandle):
-                self._plugins.cryptographic.unregister_datareader(endpoint.handle)
-        self.endpoints.clear()
-        self._plugins.cryptographic.unregister_participant(self.crypto)
-        self._plugins.access_control.return_permissions_handle(self.permissions)
-        self._plugins.authentication.return_identity_handle(self.identity)
 
 
 def settled(result: T | Pending[T]) -> T:
