@@ -16,7 +16,7 @@ from ddsi.spi import NO_OVERHEAD, NOT_FOR_US, NoKeys, Octets, Outcome, Overhead,
 from ddsi.spi import Protection as Level
 from ddsi.structure.builtin_entity_ids import SPDP_WRITER
 from ddsi.structure.guid import Guid, GuidPrefix
-from ddsi.structure.vendor import VendorId
+from ddsi.structure.vendor import OPENDDS, VendorId
 
 from .attributes import ParticipantSecurityAttributes
 from .crypto_transform_plugin import SecureSubmessageCategory
@@ -218,6 +218,13 @@ class Protection:
 
     def protects_payload(self, writer: Guid) -> bool:
         return self._payload_pair(writer) is not None
+
+    def opens_after_joining(self, reader: Guid) -> bool:
+        """Only the vendor tells: nothing on the wire announces it, and who cannot open a sample says nothing."""
+        return any(
+            pair.local.attributes.is_payload_protected and pair.participant.data.vendor_id == OPENDDS
+            for pair in self._keys.by_remote.get(reader, ())
+        )
 
     def _payload_pair(self, writer: Guid) -> Pair | None:
         for pair in self._keys.by_remote.get(writer, ()):

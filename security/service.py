@@ -105,6 +105,7 @@ class SecurityService:
         self.decode_submessage = protection.decode_submessage
         self.decode_payload = protection.decode_payload
         self.protects_payload = protection.protects_payload
+        self.opens_after_joining = protection.opens_after_joining
         self.admits = protection.admits
         return own.guid
 
@@ -282,6 +283,7 @@ class SecurityService:
     decode_submessage: Callable[[Octets, GuidPrefix], Octets | Outcome]
     decode_payload: Callable[[Guid, Octets], Octets | Outcome]
     protects_payload: Callable[[Guid], bool]
+    opens_after_joining: Callable[[Guid], bool]
     admits: Callable[[bytes, int], bool]
 
 

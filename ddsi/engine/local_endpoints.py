@@ -63,6 +63,7 @@ class LocalWriter:
         "has_lost_liveliness",
         "incompatible",
         "inconsistent",
+        "joining_readers",
         "liveliness",
         "matched",
         "packer",
@@ -80,6 +81,7 @@ class LocalWriter:
         self.has_fresh_samples = False  # were any packed since the last piggybacked HEARTBEAT?
         self.protection = ProtectedEndpoint()
         self.receivers: tuple[Guid, ...] = ()
+        self.joining_readers: frozenset[Guid] = frozenset()  # those that open a payload after joining its fragments
         self.matched = PublicationMatched()
         self.incompatible = OfferedIncompatibleQos()
         self.inconsistent = InconsistentTopic()

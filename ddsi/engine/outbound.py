@@ -88,6 +88,7 @@ class Outbound:
         added = self._hooks.overhead(writer.guid, writer.receivers)
         writer.packer.capacity = self._max_message_octets - added.message
         writer.behavior.fragment_octets = fragment_octets_for(self._max_message_octets, self._fragment_size, added)
+        writer.joining_readers = frozenset(filter(self._hooks.opens_after_joining, writer.receivers))
 
     @property
     def is_idle(self) -> bool:
@@ -116,8 +117,11 @@ class Outbound:
                 case SendData(change, reader):
                     self._send_data(writer, change, reader)
                 case SendFragments(change, first, last, reader):
-                    for number in range(first, last + 1):
-                        self._send_fragment(writer, change, number, reader)
+                    # A reader that joins first gets other octets than the rest, so each is sent its own.
+                    one_by_one = reader is None and writer.joining_readers
+                    for recipient in list(writer.behavior.readers.values()) if one_by_one else (reader,):
+                        for number in range(first, last + 1):
+                            self._send_fragment(writer, change, number, recipient)
                 case SendHeartbeat():
                     self._send_heartbeat(writer, item)
                 case SendHeartbeatFrag(change, last, count):
@@ -145,17 +149,26 @@ class Outbound:
 
     def _send_fragment(self, writer: LocalWriter, change: CacheChange, number: int, reader: ReaderProxy | None) -> None:
         size = change.fragment_octets
-        octets = memoryview(change.payload)[(number - 1) * size : number * size]
-        payload = self._hooks.encode_payload(writer.guid, octets)
+        count, sample_size = 1, len(change.payload)
+        if reader is not None and reader.guid in writer.joining_readers:
+            if change.sealed is None:
+                change.sealed = self._hooks.encode_payload(writer.guid, change.payload)
+            # What protection adds may make a fragment more; it goes with the last, so that all count fragments alike.
+            is_last, sample_size = number * size >= sample_size, len(change.sealed)
+            count = -(-sample_size // size) - number + 1 if is_last else 1
+            payload: Octets = memoryview(change.sealed)[(number - 1) * size : (number - 1 + count) * size]
+        else:
+            octets = memoryview(change.payload)[(number - 1) * size : number * size]
+            payload = self._hooks.encode_payload(writer.guid, octets)
         padding = _PADDING[len(payload) & 3]
         head = DataFrag(
             reader.entity_id if reader is not None else EntityId.UNKNOWN,
             writer.guid.entity_id,
             change.sequence_number,
             number,
-            1,
+            count,
             size,
-            len(change.payload),
+            sample_size,
             _inline_qos(change) if number == 1 else None,
             is_key=change.kind is not ChangeKind.ALIVE,
         ).encode_head(len(payload) + len(padding))

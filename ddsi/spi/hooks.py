@@ -276,6 +276,13 @@ class SecurityHooks(Protocol):
         """
         ...
 
+    def opens_after_joining(self, reader: Guid) -> bool:
+        """Does this remote reader join fragments before it opens the payload, instead of opening each run (OpenDDS)?
+
+        Then it is sent fragments of the protected sample.  Asked when a writer's receivers change.
+        """
+        ...
+
     def admits(self, sender: bytes, protection: int) -> bool:
         """May a submessage of this remote writer or reader (the 16 octets of its Guid) be acted upon, having come so?
 

@@ -103,6 +103,9 @@ class Plaintext:
     def protects_payload(self, writer: Guid) -> bool:
         return False
 
+    def opens_after_joining(self, reader: Guid) -> bool:
+        return False
+
     def admits(self, sender: bytes, protection: int) -> bool:
         return True
 

@@ -10,7 +10,7 @@ import pytest
 
 from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION
 from ddsi.engine.outbound import fragment_octets_for
-from ddsi.simulation import Domain, Node
+from ddsi.simulation import Domain, Node, invariants
 from ddsi.spi import (
     ADMITTED,
     PENDING,
@@ -599,6 +599,42 @@ def test_a_sample_may_be_protected_by_fragments_or_as_a_whole(size: int, loss: f
         whole.pump()
     assert domain.run_until(lambda: len(reader.taken) == 6, 60)
     assert {bytes(change.payload[:size]) for _, change in reader.taken} == {plain[:size]}
+
+
+class Joining(Sealing):
+    """Opens what it has joined: a run that was protected by itself is of no use to it."""
+
+    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        is_run = len(payload) < 5000 and not writer.entity_id.is_builtin
+        return Rejected("a part of a sample") if is_run else super().decode_payload(writer, payload)
+
+
+@pytest.mark.parametrize("lacking", [0, 1, 40, 41, 500])
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+def test_a_reader_that_joins_before_it_opens_gets_parts_of_what_was_protected_as_a_whole(
+    lacking: int, loss: float
+) -> None:
+    """And the others, in the same moment, runs that can be opened one by one."""
+    domain = Domain()
+    joining, other = domain.node(make_hooks=Joining), domain.node(make_hooks=Sealing)
+
+    class Knowing(Sealing):
+        def opens_after_joining(self, reader: Guid) -> bool:
+            return reader.prefix == joining.guid.prefix
+
+    a = domain.node(make_hooks=Knowing)
+    late_history = RELIABLE | Qos(durability=TransientLocal())
+    writer = a.writer("Square", late_history)
+    readers = [node.reader("Square", RELIABLE) for node in (joining, other)]
+    assert domain.run_until(domain.all_matched, 2)
+    domain.network.conditions = replace(domain.network.conditions, loss=loss)
+    for _ in range(3):  # what protection adds fits into the last fragment, or makes one more
+        writer.write(7 * writer.local.behavior.fragment_octets - lacking - 5)
+    assert domain.run_until(lambda: all(len(reader.taken) == 3 for reader in readers), 60)
+    readers.append(joining.reader("Square", late_history))
+    assert domain.run_until(lambda: len(readers[-1].taken) == 3, 60), "a late joiner too"
+    assert invariants.in_order(domain) == []
+    assert all(change.sealed is not None for change in writer.written.values())
 
 
 def test_a_whole_sample_that_does_not_open_is_dropped_and_asked_for_again() -> None:

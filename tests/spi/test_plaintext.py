@@ -57,6 +57,7 @@ def test_nothing_is_announced_and_no_endpoint_protected() -> None:
             (), discovery_protected=False, liveliness_protected=False, key_protected=False
         )
     assert not PLAINTEXT.protects_payload(GUID)
+    assert not PLAINTEXT.opens_after_joining(GUID)
 
 
 def test_octets_pass_as_they_are_and_are_not_copied() -> None:
