@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .session import Session
 
-__all__ = ["FLOOR", "OURS", "PEER", "PEER_VERSION", "Benchmark", "Better", "Figure", "Side"]
+__all__ = ["FLOOR", "OURS", "PEER", "PEER_VERSION", "SECURED", "SECURED_PEER", "Benchmark", "Better", "Figure", "Side"]
 
 PEER_VERSION = "11.0.1"
 
@@ -28,7 +28,7 @@ class Side:
 
     ``column``: where its figures stand: "ours", "peer" or "floor".  ``module``: the program that plays its roles.
     ``imports``: what an application of it imports.  ``distribution``: whose version is reported; a side whose
-    distribution is not installed is left out with a note.
+    distribution is not installed is left out with a note.  ``programs``: what must be there to run it.
     """
 
     column: str
@@ -36,6 +36,7 @@ class Side:
     imports: tuple[str, ...]
     distribution: str = ""
     wanted_version: str = ""
+    programs: tuple[str, ...] = ()
 
 
 OURS = Side("ours", "benchmarks.sides.ours", ("ddsi",), "ddsi")
@@ -46,6 +47,9 @@ PEER = Side(
     "cyclonedds",
     PEER_VERSION,
 )
+SECURED = Side("ours", "benchmarks.sides.ours", ("ddsi",), "cryptography")
+SECURED_PEER = Side("peer", "benchmarks.sides.cyclone_secured", (), programs=("gcc", "idlc"))
+"""The peer's wheel leaves security out: this is Debian's Cyclone DDS 0.10 in C, through a program of ours."""
 FLOOR = Side("floor", "benchmarks.sides.floor", ("trio",), "trio")
 
 

@@ -11,7 +11,7 @@ from .summary import Row, Values
 
 __all__ = ["as_json", "detail_lines", "head_line", "list_lines", "machine_line", "row_line"]
 
-_COLUMNS = "{:<20} {:<10} {:>11} {:>11} {:>8}  {:<13} {:>6} {:>6} {:>11}"
+_COLUMNS = "{:<42} {:<10} {:>11} {:>11} {:>8}  {:<13} {:>6} {:>6} {:>11}"
 
 
 def machine_line(machine: Mapping[str, str]) -> str:
@@ -53,7 +53,7 @@ def detail_lines(report: Report) -> list[str]:
 
 
 def list_lines(benchmarks: tuple[Benchmark, ...]) -> list[str]:
-    return [f"{benchmark.name:<20} {benchmark.summary}" for benchmark in benchmarks]
+    return [f"{benchmark.name:<36} {benchmark.summary}" for benchmark in benchmarks]
 
 
 def as_json(report: Report, plan: Plan, machine: Mapping[str, str]) -> dict[str, object]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -83,6 +84,11 @@ def _run(benchmark: Benchmark, plan: Plan, report: Report) -> list[Row]:
 
 def _absence(side: Side) -> str | None:
     """Why a side cannot be measured; None if it can."""
+    missing = [program for program in side.programs if shutil.which(program) is None]
+    if missing:
+        return f"{side.module.rpartition('.')[2]} needs {' and '.join(missing)}; its column stays empty"
+    if not side.distribution:
+        return None
     try:
         version = metadata.version(side.distribution)
     except metadata.PackageNotFoundError:

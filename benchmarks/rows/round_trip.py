@@ -17,11 +17,16 @@ _MEDIAN = "round-trip/median"
 _P99 = "round-trip/p99"
 
 
-def measure_round_trip(side: Side, session: Session, **options: object) -> dict[str, float]:
-    """``median_us`` and ``p99_us`` between the roles "echo" and "ping" of a side."""
+def measure_round_trip(
+    side: Side, session: Session, enclaves: tuple[str, str] | None = None, **options: object
+) -> dict[str, float]:
+    """``median_us`` and ``p99_us`` between the roles "echo" and "ping" of a side, in these keystore folders, if any."""
     options |= {"domain": session.domain, "count": session.count(_COUNT)}
-    session.start(side, "echo", **options).wait_ready()
-    return session.start(side, "ping", **options).result()
+    echoing, pinging = ({"enclave": enclave} for enclave in enclaves) if enclaves else ({}, {})
+    with session.start(side, "echo", **options, **echoing) as echo:
+        echo.wait_ready()
+        with session.start(side, "ping", **options, **pinging) as ping:
+            return ping.result()
 
 
 def _measure(side: Side, session: Session) -> Mapping[str, float]:

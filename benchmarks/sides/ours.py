@@ -74,8 +74,13 @@ def deserialise(octets: int, count: int) -> dict[str, float]:
 # --- throughput ------------------------------------------------------------------------------------------
 
 
-async def receive(domain: int, octets: int, count: int) -> dict[str, float]:
-    async with ddsi.DomainParticipant(domain) as participant:
+def participant_of(domain: int, enclave: str = "") -> ddsi.DomainParticipant:
+    """Secured by the keystore folder ``enclave``, if there is one."""
+    return ddsi.DomainParticipant(domain, qos=ddsi.secure(enclave) if enclave else None)
+
+
+async def receive(domain: int, octets: int, count: int, enclave: str = "") -> dict[str, float]:
+    async with participant_of(domain, enclave) as participant:
         reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Throughput", kind_of(octets)), QOS)
         say_ready()
         received = 0
@@ -93,9 +98,9 @@ async def receive(domain: int, octets: int, count: int) -> dict[str, float]:
         return {"per_second": (count - 1) / seconds, "processor_us": processor / count * 1e6}
 
 
-async def send(domain: int, octets: int, count: int) -> dict[str, float]:
+async def send(domain: int, octets: int, count: int, enclave: str = "") -> dict[str, float]:
     make = maker_of(octets)
-    async with ddsi.DomainParticipant(domain) as participant:
+    async with participant_of(domain, enclave) as participant:
         topic: ddsi.Topic[Sample] = ddsi.Topic(participant, "Throughput", kind_of(octets))
         writer = ddsi.DataWriter(participant, topic, QOS)
         await writer.wait_for_matched()
@@ -110,8 +115,8 @@ async def send(domain: int, octets: int, count: int) -> dict[str, float]:
 # --- round trip ------------------------------------------------------------------------------------------
 
 
-async def echo(domain: int, count: int) -> None:
-    async with ddsi.DomainParticipant(domain) as participant:
+async def echo(domain: int, count: int, enclave: str = "") -> None:
+    async with participant_of(domain, enclave) as participant:
         reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Ping", ShapeType), QOS)
         writer = ddsi.DataWriter(participant, ddsi.Topic(participant, "Pong", ShapeType), QOS)
         say_ready()
@@ -119,8 +124,8 @@ async def echo(domain: int, count: int) -> None:
             await writer.write(sample.data)
 
 
-async def ping(domain: int, count: int) -> dict[str, float]:
-    async with ddsi.DomainParticipant(domain) as participant:
+async def ping(domain: int, count: int, enclave: str = "") -> dict[str, float]:
+    async with participant_of(domain, enclave) as participant:
         writer = ddsi.DataWriter(participant, ddsi.Topic(participant, "Ping", ShapeType), QOS)
         reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Pong", ShapeType), QOS)
         await writer.wait_for_matched()
@@ -140,7 +145,7 @@ async def ping(domain: int, count: int) -> dict[str, float]:
         return summarise_round_trips(seconds[_WARM_UP:], time.process_time() - processor)
 
 
-# --- matching, footprint ---------------------------------------------------------------------------------
+# --- matching --------------------------------------------------------------------------------------------
 
 
 async def await_company(domain: int) -> None:
@@ -160,6 +165,33 @@ async def join(domain: int) -> dict[str, float]:
         await writer.wait_for_matched()
         await reader.wait_for_matched()
         return {"ms": (time.perf_counter() - start) * 1e3}
+
+
+# --- secured ---------------------------------------------------------------------------------------------
+
+LASTING = QOS | ddsi.Qos(durability=ddsi.TransientLocal())
+
+
+async def offer_secret(domain: int, enclave: str) -> None:
+    """Has written one sample, which lasts for whoever comes."""
+    async with participant_of(domain, enclave) as participant:
+        writer = ddsi.DataWriter(participant, ddsi.Topic(participant, "Secret", ShapeType), LASTING)
+        await writer.write(ShapeType("BLUE", 1, 20, 30))
+        await trio.sleep(_SETTLE_S)
+        say_ready()
+        await trio.sleep_forever()
+
+
+async def learn_secret(domain: int, enclave: str) -> dict[str, float]:
+    start, processor = time.perf_counter(), time.process_time()
+    async with participant_of(domain, enclave) as participant:
+        reader = ddsi.DataReader(participant, ddsi.Topic(participant, "Secret", ShapeType), LASTING)
+        await anext(reader)
+        seconds = time.perf_counter() - start
+        return {"ms": seconds * 1e3, "processor_ms": (time.process_time() - processor) * 1e3}
+
+
+# --- footprint -------------------------------------------------------------------------------------------
 
 
 async def idle(domain: int) -> dict[str, float]:
@@ -186,6 +218,8 @@ if __name__ == "__main__":
             "ping": _run(ping),
             "await_company": _run(await_company),
             "join": _run(join),
+            "offer_secret": _run(offer_secret),
+            "learn_secret": _run(learn_secret),
             "idle": _run(idle),
         }
     )

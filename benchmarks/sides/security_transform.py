@@ -1,7 +1,6 @@
 """Cryptography: octets protected and opened again in one process, each beside one bare AES-GCM call of that size.
 
-The two take turns in short bursts, and the quickest burst of each counts: the others waited for the processor, or for
-the memory.  So the ratio says what the plugin itself adds.
+The ratio says what the plugin itself adds.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from collections.abc import Callable
 
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
+from benchmarks.sides.bursts import Operation, quickest
 from benchmarks.sides.protocol import play
 from ddsi.spi import Outcome
 from ddsi_security.attributes import EndpointSecurityAttributes, ParticipantSecurityAttributes
@@ -25,9 +25,6 @@ from ddsi_security.cryptographic.crypto_handles import (
     RemoteWriter,
 )
 from ddsi_security.handles import IdentityHandle, PermissionsHandle, SharedSecretHandle
-
-_BURST_S = 100e-6
-_Operation = Callable[[], object]
 
 # Protected, encrypted, origin authenticated.
 _KINDS = {
@@ -132,34 +129,17 @@ def transform(level: str, kind: str, octets: int, count: int) -> dict[str, float
     opened = decode(protected)
     assert not isinstance(opened, Outcome), opened
     aead, nonce, plain = AESGCM(os.urandom(32)), os.urandom(12), os.urandom(octets)
-    operations: dict[str, _Operation] = {
+    operations: dict[str, Operation] = {
         "bare": lambda: aead.encrypt(nonce, plain, None),
         "encode": encode,
         "decode": lambda: decode(protected),
     }
-    seconds = _quickest(operations, count)
+    seconds = quickest(operations, count)
     return {
         "encode": seconds["encode"] / seconds["bare"],
         "decode": seconds["decode"] / seconds["bare"],
         **{f"{name}_us": value * 1e6 for name, value in seconds.items()},
     }
-
-
-def _quickest(operations: dict[str, _Operation], bursts: int) -> dict[str, float]:
-    """Seconds that one of each takes; between bursts, the others have their turn."""
-    calls = {name: max(int(_BURST_S / _seconds(operation, 3)), 1) for name, operation in operations.items()}
-    found = dict.fromkeys(operations, float("inf"))
-    for _ in range(bursts):
-        for name, operation in operations.items():
-            found[name] = min(found[name], _seconds(operation, calls[name]))
-    return found
-
-
-def _seconds(operation: _Operation, calls: int) -> float:
-    start = time.perf_counter()
-    for _ in range(calls):
-        operation()
-    return (time.perf_counter() - start) / calls
 
 
 if __name__ == "__main__":

@@ -1,0 +1,123 @@
+"""Secured: what protection costs, beside our own figures without it, which are measured right before.
+
+``x plain``: the plain time divided by the secured one, so that 1 means that protection costs nothing.  ``us/layer``:
+what each layer of protection adds to the time of a sample.  ``x bare``, for large samples: the time that a plain sample
+takes together with one bare AEAD call a layer and one copy, divided by the secured time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from benchmarks.benchmark import SECURED, SECURED_PEER, Benchmark, Better, Figure, Side
+from benchmarks.session import Session
+
+from .round_trip import measure_round_trip
+from .throughput import measure_throughput
+
+__all__ = ["BENCHMARKS"]
+
+# Layers of protection by the names of the rows, and which bare call each of them comes down to.
+_LAYERS: Mapping[str, Mapping[str, str]] = {
+    "payload": {"data": "encrypt_us"},
+    "submessage": {"metadata": "encrypt_us"},
+    "message": {"rtps": "sign_us"},
+    "all": {"data": "encrypt_us", "metadata": "encrypt_us", "rtps": "sign_us"},
+}
+_SAMPLES = {"shape": (0, 40_000), "64KiB": (1 << 16, 2_000), "1MiB": (1 << 20, 100)}
+_BURSTS = 400
+_FIRST = "secured/first-sample"
+
+
+def _enclaves(kind: str) -> tuple[str, str]:
+    from benchmarks.keystores import enclaves  # needs `cryptography`, which may be missing
+
+    return enclaves(tuple(_LAYERS[kind]))
+
+
+def _throughput(name: str, kind: str, octets: int, count: int) -> Callable[[Side, Session], Mapping[str, float]]:
+    def measure(side: Side, session: Session) -> Mapping[str, float]:
+        plain = measure_throughput(side, session, octets, count)
+        secured = measure_throughput(side, session, octets, count, _enclaves(kind))
+        plain_us, secured_us = 1e6 / plain["per_second"], 1e6 / secured["per_second"]
+        values = {
+            name: plain_us / secured_us,
+            f"{name} added": (secured_us - plain_us) / len(_LAYERS[kind]),
+            "samples/s": secured["per_second"],
+            "plain samples/s": plain["per_second"],
+            "x plain by processor time": max(plain["receiver_us"], plain["sender_us"])
+            / max(secured["receiver_us"], secured["sender_us"]),
+        }
+        for end in ("receiver_us", "sender_us"):
+            values[f"{end[:-3]} processor us/sample"] = secured[end]
+            values[f"plain {end[:-3]} processor us/sample"] = plain[end]
+        if octets:
+            bursts = session.count(max(_BURSTS * (1 << 16) // octets, 1))
+            bare = session.start_module("benchmarks.sides.aead", "bare", octets=octets, count=bursts).result()
+            bare_us = sum(bare[call] for call in _LAYERS[kind].values()) + bare["copy_us"]
+            values[f"{name} floor"] = (plain_us + bare_us) / secured_us
+            values["bare us"] = bare_us
+        return values
+
+    return measure
+
+
+def _throughput_row(kind: str, label: str, octets: int, count: int) -> Benchmark:
+    name = f"secured/throughput/{label}/{kind}"
+    figures = [Figure(name, "x plain", Better.HIGHER), Figure(f"{name} added", "us/layer", Better.LOWER)]
+    if octets:
+        figures.append(Figure(f"{name} floor", "x bare", Better.HIGHER))
+    summary = f"{_protected(kind)}, samples received in a second ({'ShapeType' if not octets else label})"
+    return Benchmark(name, summary, tuple(figures), _throughput(name, kind, octets, count), (SECURED,))
+
+
+def _round_trip(name: str, kind: str) -> Callable[[Side, Session], Mapping[str, float]]:
+    def measure(side: Side, session: Session) -> Mapping[str, float]:
+        plain = measure_round_trip(side, session)
+        secured = measure_round_trip(side, session, _enclaves(kind))
+        plain_us, secured_us = plain["median_us"], secured["median_us"]
+        return {
+            name: plain_us / secured_us,
+            f"{name} added": (secured_us - plain_us) / 2 / len(_LAYERS[kind]),  # there and back are two samples
+            "median us": secured_us,
+            "plain median us": plain_us,
+            "ping processor us/round trip": secured["processor_us"],
+            "plain ping processor us/round trip": plain["processor_us"],
+        }
+
+    return measure
+
+
+def _round_trip_row(kind: str) -> Benchmark:
+    name = f"secured/round-trip/{kind}"
+    figures = (Figure(name, "x plain", Better.HIGHER), Figure(f"{name} added", "us/layer", Better.LOWER))
+    return Benchmark(
+        name, f"{_protected(kind)}, a ShapeType there and back, median", figures, _round_trip(name, kind), (SECURED,)
+    )
+
+
+def _protected(kind: str) -> str:
+    return "all three layers protected" if kind == "all" else f"{kind} protected"
+
+
+def _first_sample(side: Side, session: Session) -> Mapping[str, float]:
+    from benchmarks.keystores import enclaves
+
+    alice, bob = enclaves(tuple(_LAYERS["all"]), discovery="ENCRYPT")
+    with session.start(side, "offer_secret", domain=session.domain, enclave=alice) as offering:
+        offering.wait_ready()
+        result = session.start(side, "learn_secret", domain=session.domain, enclave=bob).result()
+    return {_FIRST: result["ms"], "processor ms": result["processor_ms"]}
+
+
+BENCHMARKS = (
+    *(_round_trip_row(kind) for kind in _LAYERS),
+    *(_throughput_row(kind, label, octets, count) for label, (octets, count) in _SAMPLES.items() for kind in _LAYERS),
+    Benchmark(
+        _FIRST,
+        "from the start of a participant until it has a sample, everything protected",
+        (Figure(_FIRST, "ms", Better.LOWER),),
+        _first_sample,
+        (SECURED, SECURED_PEER),
+    ),
+)

@@ -1,0 +1,28 @@
+"""AEAD: what protecting octets costs when there is nothing around it - bare calls of AES-GCM, and a copy."""
+
+from __future__ import annotations
+
+import os
+
+from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+
+from .bursts import Operation, quickest
+from .protocol import PAYLOAD_BYTE, play
+
+
+def bare(octets: int, count: int) -> dict[str, float]:
+    """Microseconds to ``encrypt``, ``decrypt``, ``sign`` (octets that are only authenticated) and ``copy``."""
+    aead, nonce = AESGCM(os.urandom(32)), os.urandom(12)
+    plain = PAYLOAD_BYTE * octets
+    protected = aead.encrypt(nonce, plain, None)
+    operations: dict[str, Operation] = {
+        "encrypt": lambda: aead.encrypt(nonce, plain, None),
+        "decrypt": lambda: aead.decrypt(nonce, protected, None),
+        "sign": lambda: aead.encrypt(nonce, b"", plain),
+        "copy": lambda: bytearray(plain),
+    }
+    return {f"{name}_us": seconds * 1e6 for name, seconds in quickest(operations, count).items()}
+
+
+if __name__ == "__main__":
+    play({"bare": bare})
