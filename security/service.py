@@ -35,6 +35,7 @@ from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReade
 from ddsi.structure.guid import Guid, GuidPrefix
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import DataRepresentationId, KeepLast, Properties, Reliable, TransientLocal
+from ddsi.structure.security_information import EndpointSecurity, ParticipantSecurity
 from ddsi.xtypes import serialize
 
 from .admission import AdmissionDesk
@@ -49,6 +50,7 @@ from .mailbox import Mailbox
 from .own_participant import OwnParticipant
 from .protection import Protection
 from .remote_participant import RemoteParticipant, Standing
+from .security_information import SecurityInformation
 
 __all__ = ["SecurityService", "load"]
 
@@ -96,6 +98,7 @@ class SecurityService:
             jitter=lambda: int.from_bytes(self._entropy(4), "big") / 0xFFFFFFFF,
             changed=self._changed,
         )  # fmt: skip
+        self._information = SecurityInformation(plugins, own, self._remotes)
         # On the path of every message: not through here.
         self.overhead = protection.overhead
         self.encode_payload = protection.encode_payload
@@ -209,6 +212,12 @@ class SecurityService:
     def unmatch(self, local: Guid, remote: Guid) -> None:
         self._keys.unmatch(local, remote)
         self._protection.changed()
+
+    def participant_security(self, participant: Guid) -> ParticipantSecurity:
+        return self._information.participant(participant)
+
+    def endpoint_security(self, endpoint: DiscoveredWriterData | DiscoveredReaderData) -> EndpointSecurity:
+        return self._information.endpoint(endpoint)
 
     # --- messages and the clock --------------------------------------------------------------------------
 

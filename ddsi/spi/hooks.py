@@ -25,6 +25,7 @@ from ..structure.discovered import (
 from ..structure.guid import EntityId, Guid, GuidPrefix
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import Properties
+from ..structure.security_information import EndpointSecurity, ParticipantSecurity
 from .outcomes import Admission, Outcome, Overhead
 
 __all__ = [
@@ -212,6 +213,19 @@ class SecurityHooks(Protocol):
     def unmatch(self, local: Guid, remote: Guid) -> None:
         """A pair of the application's endpoints that was admitted, or pending, is one no more.  Builtin pairs end with
         :meth:`remote_participant_lost`."""
+        ...
+
+    # --- what applications may know ------------------------------------------------------------------------
+
+    def participant_security(self, participant: Guid) -> ParticipantSecurity:
+        """What is known of a participant, our own or a remote one that is admitted, for the application to read.
+
+        DDS-Security 1.1 §7.4.1.4, §7.4.1.6.  Of one that is not authenticated, or not known, an empty value.
+        """
+        ...
+
+    def endpoint_security(self, endpoint: DiscoveredWriterData | DiscoveredReaderData) -> EndpointSecurity:
+        """The same of an endpoint, our own or a remote one (§7.4.1.5, §7.4.1.7, §7.4.1.8)."""
         ...
 
     # --- messages and the clock --------------------------------------------------------------------------

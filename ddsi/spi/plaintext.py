@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid, GuidPrefix
+from ..structure.security_information import EndpointSecurity, ParticipantSecurity
 from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, Parts, ProtectedEndpoint
 from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
 
@@ -18,6 +19,8 @@ __all__ = ["PLAINTEXT", "Plaintext"]
 
 _NO_ANNOUNCEMENT = Announcement()
 _UNPROTECTED = ProtectedEndpoint()
+_NO_IDENTITY = ParticipantSecurity()
+_NO_SECURITY = EndpointSecurity()
 
 
 class Plaintext:
@@ -63,6 +66,12 @@ class Plaintext:
 
     def unmatch(self, local: Guid, remote: Guid) -> None:
         """Nothing was kept."""
+
+    def participant_security(self, participant: Guid) -> ParticipantSecurity:
+        return _NO_IDENTITY
+
+    def endpoint_security(self, endpoint: DiscoveredWriterData | DiscoveredReaderData) -> EndpointSecurity:
+        return _NO_SECURITY
 
     def receive_message(self, change: CacheChange, now: float) -> None:
         """The endpoints of generic messages are not announced, so none comes."""

@@ -20,6 +20,7 @@ from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
 from ddsi.structure.qos import EndpointQos
+from ddsi.structure.security_information import EndpointSecurity, ParticipantSecurity
 
 PREFIX = GuidPrefix(b"p" * 12)
 GUID = Guid.of(PREFIX, EntityId.PARTICIPANT)
@@ -57,6 +58,11 @@ def test_nothing_is_announced_and_no_endpoint_protected() -> None:
             (), discovery_protected=False, liveliness_protected=False, key_protected=False
         )
     assert not PLAINTEXT.protects_payload(GUID)
+
+
+def test_nobody_is_authenticated_and_nothing_is_said_to_be_protected() -> None:
+    assert PLAINTEXT.participant_security(GUID) == ParticipantSecurity(is_authenticated=False, subject_name="")
+    assert PLAINTEXT.endpoint_security(READER) == EndpointSecurity(is_authenticated=False, subject_name="")
     assert not PLAINTEXT.opens_after_joining(GUID)
 
 
