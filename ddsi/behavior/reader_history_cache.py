@@ -239,6 +239,11 @@ class ReaderHistoryCache:
         self._leave(instance, info)
         self._discard(info)
         self._removed_count += 1
+        self._tidy_up()
+
+    def _tidy_up(self) -> None:
+        """The queue holds about as many samples as it has; else those that are gone would pile up behind one that
+        nobody takes."""
         if self._removed_count > _COMPACT_ABOVE and self._removed_count * 2 > len(self._order):
             self._order = deque(info for info in self._order if info._change is not None)
             self._removed_count = 0
@@ -310,6 +315,7 @@ class ReaderHistoryCache:
         while self._order and self._order[0]._change is None:
             self._order.popleft()
             self._removed_count -= 1
+        self._tidy_up()
         return [(info, change) for info, change in result if change is not None]
 
     def read(

@@ -379,3 +379,14 @@ def test_a_sample_knows_when_it_was_written_and_received() -> None:
         2.5,
         received.writer_guid,
     )
+
+
+def test_what_is_taken_from_behind_a_sample_that_nobody_takes_leaves_nothing_behind() -> None:
+    cache = Cache()
+    cache.put(b"a")
+    for _ in range(1000):
+        cache.put(b"b")
+        assert len(cache.take(instance=b"b")) == 1
+    assert len(cache._order) < 200
+    cache.put(b"b")
+    assert numbers(cache.take()) == [1, 1002]
