@@ -15,7 +15,7 @@ from ddsi.messages.raw_submessage import SubmessageKind
 from ddsi.spi import NO_OVERHEAD, NOT_FOR_US, NoKeys, Octets, Outcome, Overhead, Parts, Refused, Rejected
 from ddsi.spi import Protection as Level
 from ddsi.structure.builtin_entity_ids import SPDP_WRITER
-from ddsi.structure.guid import Guid, GuidPrefix
+from ddsi.structure.guid import Guid
 from ddsi.structure.vendor import OPENDDS, VendorId
 
 from .attributes import ParticipantSecurityAttributes
@@ -152,7 +152,7 @@ class Protection:
 
     # --- inwards -----------------------------------------------------------------------------------------
 
-    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
         remote = self._remotes.get(source)
         if remote is None or remote.crypto is None:
             return _no_keys(message, 20)
@@ -161,7 +161,7 @@ class Protection:
             remote.opened += 1
         return plain
 
-    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         remote = self._remotes.get(source)
         if remote is None or remote.crypto is None:
             return _no_keys(protected, 0)

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = ["DataWriter"]
 
+_MOST_KEY_HASHES = 1024  # that are remembered, where every sample bears one
+
 T = TypeVar("T")
 Timestamp = float | datetime
 
@@ -78,6 +80,7 @@ class DataWriter(Entity, Generic[T]):
             topic.name, support.type_name, resolved, self._pump.now(), is_keyed=support.is_keyed
         )
         self._hides_keys = support.is_keyed and self._writer.protection.key_protected
+        self._key_hashes: dict[bytes, bytes] = {}
         parent._adopt(self)
         participant._register(self._writer.guid, self)
         self._pump.settle()
@@ -154,7 +157,13 @@ class DataWriter(Entity, Generic[T]):
     def _key_hash(self, key: bytes) -> bytes:
         """Where the key is protected the hash is a digest, and goes with samples too: nobody can compute it before
         decrypting them."""
-        return self._support.key_hash(key, self._representation, is_secret=self._hides_keys)
+        found = self._key_hashes.get(key)
+        if found is None:
+            if len(self._key_hashes) >= _MOST_KEY_HASHES:
+                self._key_hashes.clear()
+            found = self._support.key_hash(key, self._representation, is_secret=self._hides_keys)
+            self._key_hashes[key] = found
+        return found
 
     async def _wait_for_room(self, octets: int, key: bytes) -> float:
         """Until one more change of so many octets may enter; returns the time.  Raises DdsTimeout."""

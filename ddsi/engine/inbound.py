@@ -18,7 +18,7 @@ from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.acknack import AckNack, NackFrag
 from ..messages.data import Data
 from ..messages.data_frag import DataFrag
-from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD
+from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD, envelope_end, key_hash_alone
 from ..messages.gap import Gap
 from ..messages.heartbeat import Heartbeat, HeartbeatFrag
 from ..messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
@@ -29,7 +29,7 @@ from ..spi import NoKeys, NotForUs, Octets, Outcome, Protection, Rejected
 from ..structure.builtin_entity_ids import SPDP_WRITER
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.errors import MalformedMessage, MalformedSample
-from ..structure.guid import Guid, GuidPrefix
+from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason, SampleLossReason
@@ -44,12 +44,15 @@ _DATA = int(SubmessageKind.DATA)
 _INFO_TS = int(SubmessageKind.INFO_TS)
 _TIMESTAMP = struct.Struct("<II")
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
+_LE_DATA_AND_QOS = 0x07
+_SEC_PREFIX = int(SubmessageKind.SEC_PREFIX)
 _UNKNOWN_ID = bytes(4)
 # No writer gets that far in 100,000 years at a million samples a second.  Beyond it, what we add to a peer's numbers
 # might no longer fit the wire.
 _NUMBERS_END = 1 << 62
 _CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
 _UNKNOWN_PREFIX = bytes(12)
+_KEY_HASH_QOS = 24  # octets of an inline QoS that holds a key hash alone
 _CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
 
 
@@ -139,7 +142,7 @@ class Inbound:
 
     def _message(self, incoming: Incoming, view: memoryview) -> None:
         if len(view) >= 24 and view[20] == SubmessageKind.SRTPS_PREFIX:
-            decoded = self._hooks.decode_message(view, GuidPrefix(incoming.prefix))
+            decoded = self._hooks.decode_message(view, incoming.prefix)
             if isinstance(decoded, Outcome):
                 self._undecodable(incoming, decoded)
                 return
@@ -150,9 +153,9 @@ class Inbound:
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
         """Dispatch what lies in ``view[start:]``.
 
-        DATA and INFO_TS in their usual form are recognised here and take their short way; everything from the first
-        other submessage on is walked by ``iterate_submessages``, which knows all the rules.  Samples come in long
-        runs, so the walk returns to the short loop behind each HEARTBEAT or the like.
+        DATA, INFO_TS and envelopes in their usual form are recognised here and take their short way; everything from
+        the first other submessage on is walked by ``iterate_submessages``, which knows all the rules.  Samples come in
+        long runs, so the walk returns to the short loop behind each HEARTBEAT or the like.
         """
         position, end = start, len(view)
         unpack_head = SUBMESSAGE_HEAD.unpack_from
@@ -163,6 +166,15 @@ class Inbound:
             if kind == _DATA and flags == _LE_DATA_ONLY and length and position <= end and not length & 3:
                 if incoming.is_for_us:
                     self._data(incoming, view, body, position)
+            elif kind == _SEC_PREFIX and flags == 1 and length == 20 and (past := envelope_end(view, body - 4, end)):
+                self._envelope(incoming, view[body - 4 : past])
+                position = past
+            elif (
+                kind == _DATA and flags == _LE_DATA_AND_QOS and length and position <= end and not length & 3
+                and (key_hash := key_hash_alone(view, body, position))
+            ):  # fmt: skip
+                if incoming.is_for_us:
+                    self._data(incoming, view, body, position, key_hash)
             elif kind == _INFO_TS and flags == 1 and length == 8 and position <= end:
                 seconds, fraction = _TIMESTAMP.unpack_from(view, body)
                 incoming.timestamp = seconds << 32 | fraction
@@ -194,7 +206,7 @@ class Inbound:
         outside = incoming.protection
         if outside & _IN_ENVELOPE:
             raise MalformedMessage("an envelope within an envelope", element="SEC_PREFIX")
-        decoded = self._hooks.decode_submessage(octets, GuidPrefix(incoming.prefix))
+        decoded = self._hooks.decode_submessage(octets, incoming.prefix)
         if isinstance(decoded, Outcome):
             self._undecodable(incoming, decoded)
             return
@@ -237,8 +249,8 @@ class Inbound:
 
     # --- DATA --------------------------------------------------------------------------------------------
 
-    def _data(self, incoming: Incoming, view: memoryview, start: int, end: int) -> None:
-        """A sample in its usual form, its body at ``view[start:end]``.
+    def _data(self, incoming: Incoming, view: memoryview, start: int, end: int, key_hash: bytes = b"") -> None:
+        """A sample in its usual form, its body at ``view[start:end]``: ``key_hash`` is all of its inline QoS, if any.
 
         The general form is :meth:`_general_data`; both end in :meth:`_change`.
         """
@@ -246,12 +258,13 @@ class Inbound:
             raise MalformedMessage("a DATA without room for its payload", element="DATA", offset=start)
         _, to_inline_qos, reader_id, writer_id, high, low = DATA_BODY.unpack_from(view, start)
         number = high << 32 | low
-        payload_start = start + 4 + to_inline_qos
+        payload_start = start + 4 + to_inline_qos + (_KEY_HASH_QOS if key_hash else 0)
         if not 0 < number < _NUMBERS_END or to_inline_qos < 16 or to_inline_qos & 3 or end - payload_start < 4:
             raise MalformedMessage(f"number {number}, octetsToInlineQos {to_inline_qos}", element="DATA", offset=start)
         remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
         if remote is None:
-            self._from_unmatched(incoming, writer_id, reader_id, number, view[payload_start:end])
+            inline = _InlineQos(key_hash=key_hash) if key_hash else None
+            self._from_unmatched(incoming, writer_id, reader_id, number, view[payload_start:end], inline)
             return
         if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
@@ -268,6 +281,7 @@ class Inbound:
             bytes(payload),
             b"",
             timestamp if timestamp is not None else self._engine.wall_ticks(),
+            key_hash=key_hash,
         )
         self._change(incoming, remote, reader_id, change)
 

@@ -96,24 +96,30 @@ class Outbound:
 
     # --- writers -----------------------------------------------------------------------------------------
 
-    def send_change(self, writer: LocalWriter, change: CacheChange, now: float) -> None:
-        """The fast path for a fresh sample: DATA to all matched readers.  General form: :meth:`transmit`."""
+    def send_change(self, writer: LocalWriter, change: CacheChange) -> None:
+        """The fast path for a sample: DATA to all matched readers.  General form: :meth:`_send_data`."""
         behavior = writer.behavior
         if not behavior.locators:
             return
-        if change.kind is not ChangeKind.ALIVE or change.related is not None or change.key_hash:
+        if change.kind is not ChangeKind.ALIVE or change.related is not None:
             self._send_data(writer, change, None)
             return
         payload = self._hooks.encode_payload(writer.guid, change.payload)
         size = len(payload)
         padding = _PADDING[size & 3]
-        head = fast.data_head(_UNKNOWN_ID, writer.guid[12:], change.sequence_number, size + len(padding))
+        writer_id, number, key_hash = writer.guid[12:], change.sequence_number, change.key_hash
+        if key_hash:
+            head = fast.data_head_with_key_hash(_UNKNOWN_ID, writer_id, number, key_hash, size + len(padding))
+        else:
+            head = fast.data_head(_UNKNOWN_ID, writer_id, number, size + len(padding))
         submessage = self._hooks.encode_submessage(writer.guid, writer.receivers, (head, payload, padding))
         self._append_to_group(writer, submessage, change.source_timestamp)
 
     def transmit(self, writer: LocalWriter, transmissions: Sequence[WriterTransmission]) -> None:
         for item in transmissions:
             match item:
+                case SendData(change, None):
+                    self.send_change(writer, change)
                 case SendData(change, reader):
                     self._send_data(writer, change, reader)
                 case SendFragments(change, first, last, reader):

@@ -406,7 +406,7 @@ class Participant:
             for guid in list(behavior.local_readers):
                 self.deliver_locally(writer, self.local_readers[guid], now)
         if behavior.sends_directly(change):
-            self.outbound.send_change(writer, change, now)
+            self.outbound.send_change(writer, change)
         else:
             self.outbound.transmit(writer, behavior.unsent_changes(now))
         if writer.assertion_due != math.inf:

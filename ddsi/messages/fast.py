@@ -1,17 +1,35 @@
-"""Short forms for what makes up nearly all traffic: DATA and HEARTBEAT, little-endian, without inline QoS.
+"""Short forms for what makes up nearly all traffic: DATA and HEARTBEAT, little-endian, and SEC_ envelopes around one.
 
-RTPS 2.5 §9.4.5.3, §9.4.5.6.  The classes in ``submessages`` are the general form; a test holds both against each other.
+RTPS 2.5 §9.4.5.3, §9.4.5.6; DDS-Security 1.1 §7.3.6.3.  The classes in ``submessages`` and ``iterate_submessages`` are
+the general form; a test holds both against each other.
 """
 
 from __future__ import annotations
 
 import struct
 
-__all__ = ["DATA_BODY", "SUBMESSAGE_HEAD", "data_head", "heartbeat", "timestamp"]
+from ..serialization.cursor import Octets
+from .raw_submessage import SubmessageKind
+
+__all__ = [
+    "DATA_BODY",
+    "SUBMESSAGE_HEAD",
+    "data_head",
+    "data_head_with_key_hash",
+    "envelope_end",
+    "heartbeat",
+    "key_hash_alone",
+    "timestamp",
+]
 
 _TIMESTAMP = struct.Struct("<BBHII")
 _DATA_HEAD = struct.Struct("<BBHHH4s4siI")
+_DATA_HEAD_WITH_KEY_HASH = struct.Struct("<BBHHH4s4siIHH16sI")
+_KEY_HASH_QOS = struct.Struct("<HH16sI")
+_KEY_HASH, _SENTINEL = 0x0070, 0x0001
 _HEARTBEAT = struct.Struct("<BBH4s4siIiII")
+
+_SEC_POSTFIX = int(SubmessageKind.SEC_POSTFIX)
 
 SUBMESSAGE_HEAD = struct.Struct("<BBH")
 """kind, flags, octetsToNextHeader."""
@@ -30,6 +48,40 @@ def data_head(reader_id: bytes, writer_id: bytes, sequence_number: int, payload_
         0x15, 0x05, 20 + payload_octets if payload_octets < 65516 else 0, 0, 16, reader_id, writer_id,
         sequence_number >> 32, sequence_number & 0xFFFFFFFF,
     )  # fmt: skip
+
+
+def data_head_with_key_hash(
+    reader_id: bytes, writer_id: bytes, sequence_number: int, key_hash: bytes, payload_octets: int
+) -> bytes:
+    """The same with an inline QoS that holds a key hash (16 octets) and nothing else: 48 octets."""
+    return _DATA_HEAD_WITH_KEY_HASH.pack(
+        0x15, 0x07, 44 + payload_octets if payload_octets < 65492 else 0, 0, 16, reader_id, writer_id,
+        sequence_number >> 32, sequence_number & 0xFFFFFFFF, _KEY_HASH, 16, key_hash, _SENTINEL,
+    )  # fmt: skip
+
+
+def key_hash_alone(octets: Octets, start: int, end: int) -> bytes:
+    """The key hash in the inline QoS of the DATA body at ``octets[start:end]``; empty if that holds anything else."""
+    if end - start < 44 or octets[start + 2] != 16 or octets[start + 3]:
+        return b""
+    parameter, length, key_hash, sentinel = _KEY_HASH_QOS.unpack_from(octets, start + 20)
+    return key_hash if parameter == _KEY_HASH and length == 16 and sentinel == _SENTINEL else b""
+
+
+def envelope_end(octets: Octets, start: int, end: int) -> int:
+    """Where the envelope ends whose SEC_PREFIX is at ``octets[start]``, if it is all little-endian and holds one
+    submessage, with its length; else 0.
+    """
+    if end - start < 32:
+        return 0
+    kind, flags, length = SUBMESSAGE_HEAD.unpack_from(octets, start + 24)
+    postfix = start + 28 + length
+    if kind == _SEC_POSTFIX or not flags & 1 or not length or length & 3 or end - postfix < 4:
+        return 0
+    kind, flags, length = SUBMESSAGE_HEAD.unpack_from(octets, postfix)
+    if kind != _SEC_POSTFIX or not flags & 1 or not length or length & 3 or end - postfix < 4 + length:
+        return 0
+    return postfix + 4 + length
 
 
 def heartbeat(reader_id: bytes, writer_id: bytes, first: int, last: int, count: int, *, final: bool) -> bytes:

@@ -22,7 +22,7 @@ from ..structure.discovered import (
     DiscoveredWriterData,
     Parameter,
 )
-from ..structure.guid import EntityId, Guid, GuidPrefix
+from ..structure.guid import EntityId, Guid
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import Properties
 from ..structure.security_information import EndpointSecurity, ParticipantSecurity
@@ -270,11 +270,14 @@ class SecurityHooks(Protocol):
 
     # --- transform, inwards ------------------------------------------------------------------------------
 
-    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
-        """Undo :meth:`encode_message`, for a message whose first submessage is SRTPS_PREFIX (§8.5.1.9.5)."""
+    def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
+        """Undo :meth:`encode_message`, for a message whose first submessage is SRTPS_PREFIX (§8.5.1.9.5).
+
+        ``source``: the 12 octets of the sender's prefix.
+        """
         ...
 
-    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         """Undo :meth:`encode_submessage`: SEC_PREFIX to SEC_POSTFIX in, the submessage out (§8.5.1.9.6-8)."""
         ...
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
-from ..structure.guid import Guid, GuidPrefix
+from ..structure.guid import Guid
 from ..structure.security_information import EndpointSecurity, ParticipantSecurity
 from .hooks import Announcement, Compute, HookEffect, LocalParticipant, Octets, Parts, ProtectedEndpoint
 from .outcomes import ADMITTED, NO_OVERHEAD, NOT_FOR_US, Admission, Outcome, Overhead
@@ -100,10 +100,10 @@ class Plaintext:
     def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
         return message
 
-    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
         return NOT_FOR_US  # protected: we have no keys, so it cannot be meant for us
 
-    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         return NOT_FOR_US
 
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ddsi.behavior.transmissions import SendData
 from ddsi.engine import LocalReader, LocalWriter, Participant
 from ddsi.engine.inbound import Inbound, Incoming
 from ddsi.messages.data import Data
@@ -17,6 +16,7 @@ from ddsi.messages.gap import Gap
 from ddsi.messages.heartbeat import Heartbeat
 from ddsi.messages.interpreter import InfoDestination, InfoTimestamp
 from ddsi.messages.raw_submessage import iterate_submessages
+from ddsi.serialization.parameter_list import ParameterList
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
 from ddsi.structure.qos import Qos, reader_qos, writer_qos
@@ -92,13 +92,28 @@ READER_IDS = [EntityId.UNKNOWN, EntityId(b"\0\0\1\4"), EntityId(b"\0\0\7\4")]
 OWN_PREFIX = GuidPrefix(b"\x01\xdd" + b"E" * 10)
 
 payloads = st.binary(max_size=24).map(lambda octets: b"\0\1\0\0" + octets)
+
+
+def _inline_qos(parameters: list[tuple[int, bytes]], *, little_endian: bool) -> ParameterList | None:
+    inline = ParameterList(little_endian=little_endian)
+    for parameter, value in parameters:
+        inline.add(parameter, value)
+    return inline if parameters else None
+
+
+inline_qos = (
+    st.just([])
+    | st.just([(0x70, bytes(range(16)))])
+    | st.lists(st.tuples(st.sampled_from([0x70, 0x71, 0x8123]), st.binary(max_size=20)), max_size=2)
+)
 data = st.builds(
-    lambda reader, writer, number, payload, little: Data(reader, writer, number, None, payload).encode(
-        little_endian=little
-    ),
+    lambda reader, writer, number, inline, payload, little: Data(
+        reader, writer, number, _inline_qos(inline, little_endian=little), payload
+    ).encode(little_endian=little),
     st.sampled_from(READER_IDS),
     st.sampled_from([WRITER_ID, WRITER_ID, WRITER_ID, OTHER_ID]),
     st.integers(1, 12),
+    inline_qos,
     payloads,
     st.booleans(),
 )
@@ -174,22 +189,27 @@ def _speaker() -> tuple[Participant, LocalWriter, Stranger]:
 @given(
     st.lists(st.binary(max_size=40), min_size=1, max_size=8),
     st.lists(st.integers(0, (1 << 64) - 1), min_size=8, max_size=8),
+    st.just(b"") | st.binary(min_size=16, max_size=16),
 )
-def test_the_short_way_of_a_fresh_sample_makes_the_same_octets(samples: list[bytes], stamps: list[int]) -> None:
+def test_the_short_way_of_a_fresh_sample_makes_the_same_octets(
+    samples: list[bytes], stamps: list[int], key_hash: bytes
+) -> None:
     short, general = _speaker(), _speaker()
     for number, (octets, ticks) in enumerate(zip(samples, stamps, strict=False), 1):
         payload = b"\0\1\0\0" + octets
-        change = CacheChange(ChangeKind.ALIVE, short[1].guid, number, payload, source_timestamp=ticks)
-        short[0].outbound.send_change(short[1], change, 0.0)
-        general[0].outbound.transmit(general[1], [SendData(change)])
+        change = CacheChange(
+            ChangeKind.ALIVE, short[1].guid, number, payload, source_timestamp=ticks, key_hash=key_hash
+        )
+        short[0].outbound.send_change(short[1], change)
+        general[0].outbound._send_data(general[1], change, None)
     one, other = (_data_only(sent(participant)) for participant, _, _ in (short, general))
     assert one == other
     assert len(one) == len({number for number, *_ in one}) == len(samples)
 
 
-def _data_only(datagrams: Sequence[tuple[object, bytes]]) -> list[tuple[int, bytes, int | None]]:
-    """Number, payload and timestamp of each DATA, as a receiver sees them."""
-    out: list[tuple[int, bytes, int | None]] = []
+def _data_only(datagrams: Sequence[tuple[object, bytes]]) -> list[tuple[int, bytes, object, int | None]]:
+    """Number, payload, inline QoS and timestamp of each DATA, as a receiver sees them."""
+    out: list[tuple[int, bytes, object, int | None]] = []
     for _, octets in datagrams:
         ticks: int | None = None
         for raw in iterate_submessages(octets):
@@ -197,5 +217,5 @@ def _data_only(datagrams: Sequence[tuple[object, bytes]]) -> list[tuple[int, byt
                 ticks = InfoTimestamp.decode(raw.flags, raw.body).timestamp
             elif raw.kind == 0x15:
                 decoded = Data.decode(raw.flags, raw.body)
-                out.append((decoded.writer_sn, bytes(decoded.serialized_payload), ticks))
+                out.append((decoded.writer_sn, bytes(decoded.serialized_payload), decoded.inline_qos, ticks))
     return out

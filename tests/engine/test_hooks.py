@@ -323,7 +323,7 @@ class Masking(Hooks):
         wrapped = b"\x30\x01" + len(body).to_bytes(2, "little") + body
         return (b"\x31\x01\x04\0prot", wrapped, b"\x32\x01\x04\0stop")
 
-    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         return bytes(protected[12:-8])
 
     def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
@@ -414,7 +414,7 @@ def test_a_whole_message_that_does_not_decode_is_dropped() -> None:
             return (octets[:20], b"\x33\x01\x04\0wrap", octets[20:])
 
     class Unwrapping(Hooks):
-        def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+        def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
             return bytes(message[:20]) + bytes(message[28:])
 
     for receiving, expected in ((Hooks, 0), (Unwrapping, 1)):
@@ -499,7 +499,7 @@ def test_messages_and_fragments_leave_room_for_what_each_receiver_adds(receivers
             macs = 20 * len(receivers)
             return (*parts[:-1], b"\x32\x01" + (4 + macs).to_bytes(2, "little") + bytes(macs) + b"stop")
 
-        def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+        def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
             size = int.from_bytes(protected[10:12], "little")
             return bytes(protected[12 : 12 + size])
 

@@ -21,7 +21,7 @@ from ddsi.spi.plaintext import Plaintext
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.cache_change import ChangeKind
 from ddsi.structure.discovered import DiscoveredReaderData
-from ddsi.structure.guid import EntityId, Guid, GuidPrefix
+from ddsi.structure.guid import EntityId, Guid
 from ddsi.structure.qos import Qos, reader_qos, writer_qos
 from ddsi.structure.qos_policies import ManualByTopic, Reliable
 from ddsi.structure.sequence_number import NumberSet
@@ -43,10 +43,10 @@ class Wrapped(Plaintext):
         self.answer = True
         self.content: bytes | None = None  # of every envelope, whatever it seems to hold
 
-    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
         return bytes(message[:20]) + bytes(message[28:])
 
-    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         return bytes(protected[8:-8]) if self.content is None else self.content
 
     def admits(self, sender: bytes, protection: int) -> bool:

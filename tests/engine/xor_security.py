@@ -247,7 +247,7 @@ class XorSecurity(Plaintext):
         key = self._kx_key(receivers[0].prefix) if entity in VOLATILE else _key(sender)
         return _frame(0x31, sender, key, b"".join(submessage))
 
-    def decode_submessage(self, protected: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         sender = Guid(protected[4:20])
         if sender.prefix != source:
             return Rejected(f"{sender} speaks as {source}")
@@ -262,7 +262,7 @@ class XorSecurity(Plaintext):
         octets = b"".join(message)
         return (octets[:20], *_frame(0x33, self.guid, _key(self.guid), octets[20:]))
 
-    def decode_message(self, message: Octets, source: GuidPrefix) -> Octets | Outcome:
+    def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
         plain = _open(message[20:], self.participant_keys.get(source))
         return plain if isinstance(plain, Outcome) else bytes(message[:20]) + bytes(plain)
 
