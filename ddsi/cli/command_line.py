@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module, metadata
@@ -12,6 +11,7 @@ from typing import NoReturn, Protocol, cast
 from ..structure.errors import DdsError
 from ..transport.wall_clock import wall_clock
 from .exit_status import CommandError, ExitStatus
+from .runner import abandon_output
 
 __all__ = ["ENTRY_POINT_GROUP", "Command", "main"]
 
@@ -70,7 +70,7 @@ def main(words: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return ExitStatus.INTERRUPTED
     except BrokenPipeError:
-        _abandon_output()
+        abandon_output()
         return ExitStatus.BROKEN_PIPE
     except (CommandError, DdsError) as error:
         return _complain(name, str(error))
@@ -154,10 +154,3 @@ def _tolerate_narrow_encodings() -> None:
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="replace")
-
-
-def _abandon_output() -> None:
-    """Whoever read our output is gone; what is buffered must not be tried again when the interpreter ends."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)

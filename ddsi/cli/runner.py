@@ -17,7 +17,7 @@ import trio
 
 from .exit_status import ExitStatus
 
-__all__ = ["run"]
+__all__ = ["abandon_output", "run"]
 
 _SIGNAL_BASE = 128
 
@@ -31,6 +31,13 @@ def run(command: Callable[[], Awaitable[int]]) -> int:
         return trio.run(_supervised, command)
     except BaseExceptionGroup as group:
         raise _innermost(group) from None
+
+
+def abandon_output() -> None:
+    """Whoever read our output is gone; what is buffered must not be tried again when the interpreter ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
 async def _supervised(command: Callable[[], Awaitable[int]]) -> int:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from ..framework.errors import Unavailable
 
-__all__ = ["CYCLONE", "FASTDDS", "PROGRAMS", "Recipe", "build"]
+__all__ = ["CYCLONE", "CYCLONE_SHAPE_MAIN", "FASTDDS", "PROGRAMS", "Recipe", "build"]
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = Path(__file__).resolve().parent / "programs"
@@ -52,6 +52,21 @@ CYCLONE = Recipe(
             *("gcc", "-O1", "-Wall", "-Wextra", "-I", ".", "-I", "{sources}"),
             f'-DSECURITY_LIBRARIES="/usr/lib/{_MULTIARCH}/libddsc0debian"',
             *("{sources}/cyclone_shapes.c", "shapes.c", "-o", "cyclone_shapes", "-lddsc"),
+        ),
+    ),
+)
+
+CYCLONE_SHAPE_MAIN = Recipe(
+    program="cyclone_shape_main",
+    sources=("cyclone_shape_main.c", "suite_shape.idl"),
+    tools=("gcc", "idlc"),
+    header="/usr/include/dds/dds.h",
+    packages="gcc libc6-dev cyclonedds-dev cyclonedds-tools",
+    commands=(
+        ("idlc", "-l", "c", "{sources}/suite_shape.idl"),
+        (
+            *("gcc", "-O1", "-Wall", "-Wextra", "-I", ".", "{sources}/cyclone_shape_main.c", "suite_shape.c"),
+            *("-o", "cyclone_shape_main", "-lddsc"),
         ),
     ),
 )

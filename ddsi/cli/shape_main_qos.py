@@ -1,0 +1,104 @@
+"""From the options of ``ddsi-shape-main`` to QoS and configuration, and what of them the stack cannot do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..config import Config
+from ..structure.qos import Qos
+from ..structure.qos_policies import (
+    BestEffort,
+    DataRepresentation,
+    Deadline,
+    Durability,
+    Exclusive,
+    KeepAll,
+    KeepLast,
+    Lifespan,
+    OwnershipStrength,
+    Partition,
+    Persistent,
+    Reliable,
+    Shared,
+    TimeBasedFilter,
+    Transient,
+    TransientLocal,
+    Volatile,
+    WriterDataLifecycle,
+)
+from .shape_main_options import ShapeMainOptions
+
+__all__ = ["endpoint_qos", "group_qos", "participant_config", "unsupported"]
+
+_DURABILITIES: dict[str, type[Durability]] = {
+    "v": Volatile,
+    "l": TransientLocal,
+    "t": Transient,
+    "p": Persistent,
+}
+# What one UDP datagram holds, as Config wants it; the engine lowers it further to what fits beside headers.
+_LARGEST_DATAGRAM = 65507
+
+
+def unsupported(options: ShapeMainOptions) -> str | None:
+    """The first thing asked for that this stack does not do, in the words that the suite looks for; None if all can be.
+
+    Better said than done half: the suite tells "cannot" from "does it wrong".
+    """
+    filters = not options.publishes and (options.color is not None or options.filter_expression is not None)
+    features = (
+        ("Presentation Coherent Access", options.is_coherent),
+        ("Presentation Ordered Access", options.is_ordered),
+        ("Presentation Access Scope", options.access_scope in ("t", "g")),
+        ("Content filtered topic", filters),
+        ("Ownership EXCLUSIVE", options.ownership_strength >= 0),
+        ("Deadline", options.deadline_ms > 0),
+        ("Time based filter", not options.publishes and options.time_filter_ms > 0),
+        ("Lifespan", options.publishes and options.lifespan_ms > 0),
+    )
+    return next((f"{feature} = not supported" for feature, is_wanted in features if is_wanted), None)
+
+
+def participant_config(options: ShapeMainOptions, config: Config) -> Config:
+    """What the environment says, changed where the options say more."""
+    if options.announcement_ms:
+        config = replace(config, spdp_interval=options.announcement_ms / 1000)
+    if options.fragment_octets:
+        largest = config.max_message_size or _LARGEST_DATAGRAM
+        config = replace(config, fragment_size=min(options.fragment_octets, largest))
+    return config
+
+
+def group_qos(options: ShapeMainOptions) -> Qos:
+    """Of the publisher or subscriber."""
+    return Qos(partition=Partition(options.partition)) if options.partition is not None else Qos()
+
+
+def endpoint_qos(options: ShapeMainOptions) -> Qos:
+    """Of each writer or reader."""
+    qos = Qos(
+        reliability=Reliable() if options.is_reliable else BestEffort(),
+        durability=_DURABILITIES[options.durability](),
+        data_representation=DataRepresentation(options.representation),
+        ownership=Exclusive() if options.ownership_strength >= 0 else Shared(),
+    )
+    if options.history_depth >= 0:
+        qos |= Qos(history=KeepLast(options.history_depth) if options.history_depth else KeepAll())
+    if options.deadline_ms:
+        qos |= Qos(deadline=Deadline(options.deadline_ms / 1000))
+    return qos | (_writer_qos(options) if options.publishes else _reader_qos(options))
+
+
+def _writer_qos(options: ShapeMainOptions) -> Qos:
+    qos = Qos()
+    if options.ownership_strength >= 0:
+        qos |= Qos(ownership_strength=OwnershipStrength(options.ownership_strength))
+    if options.lifespan_ms:
+        qos |= Qos(lifespan=Lifespan(options.lifespan_ms / 1000))
+    if options.final_instance_state == "u":  # readers shall see that nobody writes, not that it is at its end
+        qos |= Qos(writer_data_lifecycle=WriterDataLifecycle(autodispose_unregistered_instances=False))
+    return qos
+
+
+def _reader_qos(options: ShapeMainOptions) -> Qos:
+    return Qos(time_based_filter=TimeBasedFilter(options.time_filter_ms / 1000)) if options.time_filter_ms else Qos()
