@@ -1,4 +1,4 @@
-"""``ddsi-shape-main``: its options, their QoS, its lines and statuses; whole cases are ``multiproc_tests``' business."""
+"""``ddsi-shape-main``: its options, their QoS, its lines and statuses; the cases are ``multiproc_tests``' business."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from ddsi.structure.sample_info import InstanceState, SampleInfo
 PAGE = (Path(__file__).parents[2] / "docs" / "shape_main.md").read_text(encoding="utf-8")
 
 
-def _options(*words: str) -> ShapeMainOptions:
-    return parse_options(["-t", "Square", *words])
+def _options(words: str) -> ShapeMainOptions:
+    return parse_options(["-t", "Square", *words.split()])
 
 
 # --- options ---------------------------------------------------------------------------------------------
@@ -54,7 +54,7 @@ OPTIONS: list[tuple[str, dict[str, Any]]] = [
 
 @pytest.mark.parametrize(("words", "expected"), OPTIONS)
 def test_options_are_read_as_the_suite_gives_them(words: str, expected: dict[str, Any]) -> None:
-    options = _options(*words.split())
+    options = _options(words)
     assert {name: getattr(options, name) for name in expected} == expected
 
 
@@ -66,7 +66,7 @@ def test_options_are_read_as_the_suite_gives_them(words: str, expected: dict[str
 )  # fmt: skip
 def test_what_cannot_be_meant_is_refused(words: str) -> None:
     with pytest.raises(OptionError):
-        _options(*words.split())
+        _options(words)
 
 
 def test_wrong_arguments_end_with_status_1_and_the_help(capsys: pytest.CaptureFixture[str]) -> None:
@@ -77,15 +77,17 @@ def test_wrong_arguments_end_with_status_1_and_the_help(capsys: pytest.CaptureFi
 
 
 def test_names_of_topics_and_instances_are_numbered_from_the_second() -> None:
-    options = _options("-P", "--num-topics", "3", "--num-instances", "2")
+    options = _options("-P --num-topics 3 --num-instances 2")
     assert options.topics() == ("Square", "Square1", "Square2")
     assert options.colors() == ("BLUE", "BLUE1")
 
 
 def test_what_means_nothing_in_a_role_is_said_without_the_words_that_end_a_case() -> None:
-    everything = ("-R", "--time-filter", "1", "--take-read", "--cft", "x=1", "-z", "1", "--lifespan", "1")
-    more = ("--num-instances", "2", "--final-instance-state", "u", "--additional-payload-size", "1")
-    said = warnings(_options("-P", *everything, *more)) + warnings(_options("-S", *everything, *more))
+    everything = (
+        "-R --time-filter 1 --take-read --cft x=1 -z 1 --lifespan 1 --num-instances 2 --final-instance-state u "
+        "--additional-payload-size 1"
+    )
+    said = warnings(_options(f"-P {everything}")) + warnings(_options(f"-S {everything}"))
     assert len(said) == 10
     assert not re.search("not supported", " ".join(said), re.IGNORECASE)
 
@@ -104,7 +106,7 @@ def test_the_defaults_are_reliable_volatile_and_one_representation() -> None:
 
 
 def test_options_become_policies() -> None:
-    options = _options(*"-P -b -k 0 -D p -x 2 -s 3 -f 2000 --lifespan 250 --final-instance-state u -p p1".split())
+    options = _options("-P -b -k 0 -D p -x 2 -s 3 -f 2000 --lifespan 250 --final-instance-state u -p p1")
     qos = endpoint_qos(options)
     assert isinstance(qos.reliability, p.BestEffort)
     assert isinstance(qos.durability, p.Persistent)
@@ -117,13 +119,13 @@ def test_options_become_policies() -> None:
 
 
 def test_a_subscriber_has_neither_strength_nor_lifespan() -> None:
-    qos = endpoint_qos(_options(*"-S -s 3 -k 5 --lifespan 250 --time-filter 1000".split()))
+    qos = endpoint_qos(_options("-S -s 3 -k 5 --lifespan 250 --time-filter 1000"))
     assert (qos.ownership, qos.ownership_strength, qos.lifespan) == (p.Exclusive(), None, None)
     assert (qos.history, qos.time_based_filter) == (p.KeepLast(5), p.TimeBasedFilter(1.0))
 
 
 def test_announcements_and_fragments_are_configuration() -> None:
-    config = participant_config(_options(*"-P --periodic-announcement 500 --datafrag-size 65535".split()), Config())
+    config = participant_config(_options("-P --periodic-announcement 500 --datafrag-size 65535"), Config())
     assert (config.spdp_interval, config.fragment_size) == (0.5, 65507)
     assert participant_config(_options("-P"), Config(fragment_size=1000)) == Config(fragment_size=1000)
 
@@ -141,7 +143,7 @@ def test_what_cannot_be_done_ends_with_the_words_that_the_suite_looks_for(
 
 @pytest.mark.parametrize("words", ["-P -c RED", "-S --access-scope i", "-P -p x -D t -k 0"])
 def test_what_can_be_done_is_done(words: str) -> None:
-    assert unsupported(_options(*words.split())) is None
+    assert unsupported(_options(words)) is None
 
 
 # --- lines -----------------------------------------------------------------------------------------------
