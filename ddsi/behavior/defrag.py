@@ -158,6 +158,10 @@ class Defragmenter:
     def __len__(self) -> int:
         return self._count
 
+    def __contains__(self, sequence_number: object) -> bool:
+        """Are fragments of this sample here, for whomever?"""
+        return sequence_number in self._partial
+
     def add(
         self,
         sequence_number: int,

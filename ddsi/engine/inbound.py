@@ -51,6 +51,11 @@ _UNKNOWN_ID = bytes(4)
 # might no longer fit the wire.
 _NUMBERS_END = 1 << 62
 _CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
+# What one message may ask for beyond its parsing, counted as if each were so many members of a number set.  Honest ones
+# hold an announcement of a participant, some sets, and the end of one large sample with the beginning of another.
+_MOST_WORK = 16_384
+_WORK_OF_A_PARTICIPANT = 1024
+_WORK_OF_A_FRAGMENTED_SAMPLE = 256
 _UNKNOWN_PREFIX = bytes(12)
 _KEY_HASH_QOS = 24  # octets of an inline QoS that holds a key hash alone
 _CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
@@ -70,6 +75,7 @@ class Incoming:
         "timestamp",
         "vendor_id",
         "version",
+        "work",
     )
 
     def __init__(self, source: Locator, prefix: bytes, vendor_id: bytes, version: tuple[int, int], now: float) -> None:
@@ -83,6 +89,7 @@ class Incoming:
         self.destination = _UNKNOWN_PREFIX
         self.is_for_us = True
         self.protection = _CLEAR
+        self.work = 0
 
 
 class Inbound:
@@ -222,6 +229,14 @@ class Inbound:
                 self._engine.dropped(DropReason.NO_KEYS, incoming.source, key_id.hex())
             case Rejected(reason):
                 self._engine.dropped(DropReason.REJECTED_BY_SECURITY, incoming.source, reason)
+
+    def _may_ask(self, incoming: Incoming, work: int) -> bool:
+        """May this message make us do so much more?  What it asks for in vain it, or the next one, will ask again."""
+        if incoming.work + work > _MOST_WORK:
+            self._engine.dropped(DropReason.OVERLOADED_MESSAGE, incoming.source)
+            return False
+        incoming.work += work
+        return True
 
     # --- the receiver's state ----------------------------------------------------------------------------
 
@@ -401,7 +416,8 @@ class Inbound:
                 bytes(payload),
                 key_hash=inline.key_hash if inline is not None else b"",
             )
-            self._engine.discovery.receive_spdp(incoming, change)
+            if self._may_ask(incoming, _WORK_OF_A_PARTICIPANT):
+                self._engine.discovery.receive_spdp(incoming, change)
             return
         reason = DropReason.UNKNOWN_PARTICIPANT if incoming.participant is None else DropReason.UNMATCHED
         self._engine.dropped(reason, incoming.source)
@@ -423,6 +439,9 @@ class Inbound:
             self._engine.dropped(DropReason.SAMPLE_TOO_LARGE, incoming.source, f"{data.sample_size} octets")
             return
         if not self._is_wanted(incoming, remote, data):
+            return
+        is_begun = data.writer_sn in remote.defragmenter
+        if not is_begun and not self._may_ask(incoming, _WORK_OF_A_FRAGMENTED_SAMPLE):
             return
         is_protected = self._hooks.protects_payload(remote.guid)
         if data.non_standard_payload and not is_protected:
@@ -531,7 +550,11 @@ class Inbound:
         self._forget_settled(incoming, heartbeat.writer_id)
         # A participant that may not say in clear that it changed does not begin anew by its numbers: HEARTBEATs of the
         # past can be sent again by anybody, protected as they are.  Such a one has to authenticate anew.
-        if restarted and self._hooks.admits(incoming.prefix + SPDP_WRITER, incoming.protection):
+        if (
+            restarted
+            and self._hooks.admits(incoming.prefix + SPDP_WRITER, incoming.protection)
+            and self._may_ask(incoming, _WORK_OF_A_PARTICIPANT)
+        ):
             self._engine.discovery.participant_restarted(incoming)
         if heartbeat.liveliness and pairs:
             self._engine.liveliness.writer_asserted(Guid(incoming.prefix + heartbeat.writer_id), incoming.now)
@@ -540,6 +563,8 @@ class Inbound:
         """RTPS 2.5 §8.3.8.7: ask at once for fragments that should be here.  Ignored for samples of which none is."""
         heartbeat = HeartbeatFrag.decode(raw.flags, raw.body)
         _check_number(heartbeat.writer_sn, raw)
+        if not self._may_ask(incoming, _WORK_OF_A_FRAGMENTED_SAMPLE):
+            return
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
             if proxy.is_reliable and heartbeat.writer_sn >= proxy.next_sn:
                 self._engine.fragments_announced(local, proxy, heartbeat.writer_sn, heartbeat.last_fragment_num)
@@ -547,6 +572,8 @@ class Inbound:
     def _gap(self, incoming: Incoming, raw: RawSubmessage) -> None:
         gap = Gap.decode(raw.flags, raw.body)
         _check_number(max(gap.gap_start, gap.gap_list.end), raw)
+        if not self._may_ask(incoming, gap.gap_list.bitmap.bit_count()):
+            return
         for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
             local.behavior.receive_gap(proxy, gap.gap_start, gap.gap_list, incoming.now)
             self._engine.proxy_touched(local.behavior, proxy)
@@ -574,6 +601,8 @@ class Inbound:
         if not self._hooks.admits(reader_guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
+        if not self._may_ask(incoming, acknack.reader_sn_state.bitmap.bit_count()):
+            return
         acked_sn = proxy.acked_sn
         answers = writer.behavior.receive_acknack(
             proxy, acknack.reader_sn_state, acknack.count, incoming.now, final=acknack.final
@@ -595,6 +624,8 @@ class Inbound:
             return
         if not self._hooks.admits(reader_guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
+            return
+        if not self._may_ask(incoming, nack.fragment_number_state.bitmap.bit_count()):
             return
         answers = writer.behavior.receive_nack_frag(
             proxy, nack.writer_sn, nack.fragment_number_state, nack.count, incoming.now

@@ -73,6 +73,8 @@ class DropReason(StrEnum):
     READER_FULL = "reader_full"
     """Resource limits; a reliable reader leaves it unacknowledged and gets it again."""
     SAMPLE_TOO_LARGE = "sample_too_large"
+    OVERLOADED_MESSAGE = "overloaded_message"
+    """One message asks for more work than any honest one: numbers by the thousand, participants by the dozen."""
     RATE_LIMITED = "rate_limited"
     """Answering would amplify: the peer has used up what we send to an address that has not proved itself."""
     QUEUE_FULL = "queue_full"
