@@ -56,6 +56,7 @@ class AdmissionDesk:
             self._step(proxy, SecurityStep.ADMITTED)
             if proxy.is_admitted:  # once more: it has started again, and has authenticated anew
                 self._engine.discovery.endpoints_lost(proxy, LossReason.RESTARTED, now)
+                self._engine.builtin_readers.announced(proxy.data, now)
                 self._engine.builtin.begin_anew(proxy, now)
             else:
                 self._admit(proxy, now)
@@ -63,6 +64,7 @@ class AdmissionDesk:
     def _admit(self, proxy: ParticipantProxy, now: float) -> None:
         proxy.refusal = ""
         proxy.is_admitted = True
+        self._engine.builtin_readers.announced(proxy.data, now)
         self._engine.builtin.match(proxy, Stage.ADMITTED, now)
 
     def _refused(self, proxy: ParticipantProxy, reason: str, now: float) -> None:

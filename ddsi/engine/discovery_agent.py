@@ -250,6 +250,8 @@ class DiscoveryAgent:
         engine.admission.announced_again(proxy, now)
         if proxy.prefix not in engine.participants:
             return
+        if proxy.is_admitted:
+            engine.builtin_readers.announced(data, now)
         if (before.metatraffic_unicast, before.default_unicast) != (data.metatraffic_unicast, data.default_unicast):
             engine.host_heard(proxy, now)
         engine.discovery_changed()
@@ -268,6 +270,7 @@ class DiscoveryAgent:
         if reason is LossReason.LEASE_EXPIRED:
             self._announcer.participant_lost(proxy.metatraffic, now)
             self._arm()
+        engine.builtin_readers.lost(proxy.guid, reason, now)
         engine.recorder.participant_lost(proxy.guid, reason, detail)
         engine.discovery_changed()
 
@@ -435,9 +438,15 @@ class DiscoveryAgent:
         proxy.endpoint_count += 1
         return True
 
-    def _note_endpoint(self, data: DiscoveredEndpointData, before: DiscoveredEndpointData | None, now: float) -> None:
+    def _note_endpoint(
+        self,
+        data: DiscoveredWriterData | DiscoveredReaderData,
+        before: DiscoveredEndpointData | None,
+        now: float,
+    ) -> None:
         engine = self._engine
         engine.recorder.endpoint(data, is_new=before is None)
+        engine.builtin_readers.announced(data, now)
         engine.discovery_changed()
 
     def _writer_lost(self, guid: Guid, reason: LossReason, now: float) -> None:
@@ -457,6 +466,7 @@ class DiscoveryAgent:
         proxy = engine.participants.get(guid.prefix)
         if proxy is not None:
             proxy.endpoint_count -= 1
+        engine.builtin_readers.lost(guid, reason, now)
         engine.recorder.endpoint_lost(guid, reason)
         engine.discovery_changed()
 

@@ -57,6 +57,7 @@ from ..structure.vendor import PROTOCOL_VERSION
 from ..trace.reasons import DropReason, LossReason, SampleLossReason, SecurityStep
 from .admission import AdmissionDesk
 from .alarms import Alarms
+from .builtin_topic_readers import BuiltinTopicReaders
 from .builtin_topics import BuiltinTopics
 from .discovery_agent import DiscoveryAgent
 from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
@@ -162,6 +163,7 @@ class Participant:
         self.liveliness = Liveliness(self)
         self.admission = AdmissionDesk(self)
         self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
+        self.builtin_readers = BuiltinTopicReaders(self)
         self.builtin = BuiltinTopics(self)
         self.builtin.create(self.discovery.data.builtin_endpoints)
 
@@ -247,7 +249,7 @@ class Participant:
         self.now = now
         kind = EntityKind.WRITER_WITH_KEY if is_keyed else EntityKind.WRITER_NO_KEY
         data = DiscoveredWriterData(
-            guid=self._new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
+            guid=self.new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
             vendor_id=self.config.vendor_id, type_information=type_information,
         )  # fmt: skip
         protection = self.hooks.local_writer(data)
@@ -280,7 +282,7 @@ class Participant:
         self.now = now
         kind = EntityKind.READER_WITH_KEY if is_keyed else EntityKind.READER_NO_KEY
         data = DiscoveredReaderData(
-            guid=self._new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
+            guid=self.new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
             vendor_id=self.config.vendor_id, type_information=type_information,
         )  # fmt: skip
         protection = self.hooks.local_reader(data)
@@ -519,6 +521,9 @@ class Participant:
         self._effects.append(StatusChanged(entity, status))
         self.recorder.status(entity, status)
 
+    def data_available(self, reader: Guid) -> None:
+        self._effects.append(DataAvailable(reader))
+
     def discovery_changed(self) -> None:
         if not self._effects or not isinstance(self._effects[-1], DiscoveryChanged):
             self._effects.append(DiscoveryChanged())
@@ -666,7 +671,7 @@ class Participant:
         reader = self.local_readers[data.guid] = LocalReader(data, behavior, cache, keys)
         return reader
 
-    def _new_guid(self, kind: EntityKind) -> Guid:
+    def new_guid(self, kind: EntityKind) -> Guid:
         key = self._next_entity_key
         self._next_entity_key += 1
         return Guid.of(self.guid.prefix, EntityId.user(key, kind))
