@@ -27,6 +27,7 @@ class ParticipantProxy:
     """
 
     __slots__ = (
+        "_endpoint_hosts",
         "_hosts",
         "data",
         "endpoint_count",
@@ -51,7 +52,8 @@ class ParticipantProxy:
         self.refusal = ""  # why security refuses it, if it does
         self.has_lost_liveliness = False
         self.endpoint_count = 0
-        self._hosts: dict[bytes, None] = {}
+        self._hosts: dict[bytes, None] = {}  # that it spoke from
+        self._endpoint_hosts: dict[bytes, None] = {}  # that its endpoints announced
 
     def __repr__(self) -> str:
         return f"<ParticipantProxy {self.prefix}>"
@@ -66,18 +68,28 @@ class ParticipantProxy:
         return self.last_heard + self.data.lease_duration if self.data.lease_duration < math.inf else math.inf
 
     def heard_from(self, source: Locator) -> bool:
-        """A datagram came from there; returns whether that host is new."""
+        """A datagram came from there; returns whether that is news: a host that it can now be reached at.
+
+        Anybody can put this participant's prefix into a datagram.  So hosts that nobody announced give way to each
+        other, and never does one that was announced: that must not make us forget where it lives.
+        """
         if source.address in self._hosts:
             return False
+        announced = {locator.address for locator in (*self.data.metatraffic_unicast, *self.data.default_unicast)}
+        announced.update(self._endpoint_hosts)
         if len(self._hosts) >= _MAX_HOSTS:
-            # Anybody can put this participant's prefix into a datagram: that must not make us forget where it lives.
-            announced = {locator.address for locator in (*self.data.metatraffic_unicast, *self.data.default_unicast)}
             unannounced = next((host for host in self._hosts if host not in announced), None)
             if unannounced is None:
                 return False
             del self._hosts[unannounced]
         self._hosts[source.address] = None
-        return True
+        return source.address in announced
+
+    def endpoint_announced(self, unicast: tuple[Locator, ...]) -> None:
+        """One of its endpoints is to be reached there, which may be where the participant itself is not."""
+        for locator in unicast:
+            if len(self._endpoint_hosts) < _MAX_HOSTS:
+                self._endpoint_hosts[locator.address] = None
 
     def reachable(self, locators: tuple[Locator, ...]) -> tuple[Locator, ...]:
         """The first of the unicast locators that lies on a host which this participant spoke from, or none."""

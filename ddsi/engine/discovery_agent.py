@@ -445,6 +445,9 @@ class DiscoveryAgent:
         now: float,
     ) -> None:
         engine = self._engine
+        proxy = engine.participants.get(data.guid.prefix)
+        if proxy is not None:
+            proxy.endpoint_announced(data.unicast)
         engine.recorder.endpoint(data, is_new=before is None)
         engine.builtin_readers.announced(data, now)
         engine.discovery_changed()

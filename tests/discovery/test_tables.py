@@ -78,6 +78,7 @@ def test_nothing_is_sent_to_a_host_that_is_only_claimed() -> None:
     assert (participant.metatraffic, participant.user_traffic(())) == ((), ())
     assert participant.heard_from(META._replace(port=50_000))
     assert (participant.metatraffic, participant.user_traffic(())) == ((META,), (USER,))
+    participant.endpoint_announced((ELSEWHERE,))
     assert participant.user_traffic((ELSEWHERE,)) == ()
     assert participant.heard_from(ELSEWHERE)
     assert participant.user_traffic((ELSEWHERE,)) == (ELSEWHERE,)
@@ -116,3 +117,26 @@ def test_hosts_are_bounded_and_none_that_is_announced_is_forgotten() -> None:
         participant.heard_from(Locator.udp_v4(f"10.9.9.{number}", 1))
     assert participant.metatraffic == (META,)
     assert len(participant._hosts) <= 8
+
+
+def test_a_host_that_an_endpoint_announced_is_not_forgotten_either() -> None:
+    participant = proxy()
+    participant.endpoint_announced((ELSEWHERE,))
+    participant.heard_from(ELSEWHERE)
+    for number in range(100):
+        participant.heard_from(Locator.udp_v4(f"10.9.9.{number}", 1))
+    assert participant.user_traffic((ELSEWHERE,)) == (ELSEWHERE,)
+
+
+def test_a_true_host_that_speaks_after_all_forged_ones_is_heard() -> None:
+    participant = proxy()
+    for number in range(100):
+        assert not participant.heard_from(Locator.udp_v4(f"10.9.9.{number}", 1)), "nobody announced it: no news"
+    assert participant.heard_from(META)
+    assert participant.metatraffic == (META,)
+
+
+def test_a_host_that_is_announced_after_it_spoke_is_known() -> None:
+    participant = proxy()
+    participant.heard_from(ELSEWHERE)
+    assert participant.user_traffic((ELSEWHERE,)) == (ELSEWHERE,)
