@@ -42,6 +42,12 @@ class SpdpAnnouncer:
     def start(self, now: float) -> None:
         self._due = now
 
+    def start_again(self, destinations: tuple[Locator, ...], now: float) -> None:
+        """We may be somewhere else: announce there, and as at the start, as nobody knows when others can hear us."""
+        self.destinations = destinations
+        self._announced_count = 0
+        self._due = now
+
     def announce_soon(self, now: float) -> None:
         """What we announce has changed."""
         self._due = min(self._due, now)

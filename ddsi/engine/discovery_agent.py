@@ -107,6 +107,11 @@ class DiscoveryAgent:
         self._send_spdp(tuple(locator for proxy in self._engine.participants.values() for locator in proxy.metatraffic))
         self._arm()
 
+    def network_changed(self, data: DiscoveredParticipantData, announce_to: tuple[Locator, ...], now: float) -> None:
+        """We are reached elsewhere, or at the same place again: ``data`` says where."""
+        self._announcer.start_again(announce_to, now)
+        self.announce_change(data, now)
+
     def say_goodbye(self, now: float) -> None:
         """Dispose ourselves towards everybody; RTPS 2.5 §8.5.3.2.2.  Lost goodbyes are what leases are for."""
         guid, kind = self._engine.guid, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED

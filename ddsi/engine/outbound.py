@@ -8,7 +8,7 @@ they cannot place, and some keep an INFO_DST longer than they should (Fast DDS d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from ..behavior.reader_proxy import ReaderProxy
 from ..behavior.transmissions import (
@@ -89,6 +89,12 @@ class Outbound:
         writer.packer.capacity = self._max_message_octets - added.message
         writer.behavior.fragment_octets = fragment_octets_for(self._max_message_octets, self._fragment_size, added)
         writer.joining_readers = frozenset(filter(self._hooks.opens_after_joining, writer.receivers))
+
+    def message_size_changed(self, max_message_octets: int, writers: Iterable[LocalWriter]) -> None:
+        """We send through other interfaces.  No message may be open; what is in a history keeps its fragments' size."""
+        self._max_message_octets = max_message_octets
+        for writer in writers:
+            self.receivers_changed(writer)
 
     @property
     def is_idle(self) -> bool:

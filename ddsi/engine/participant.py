@@ -198,6 +198,30 @@ class Participant:
         """When :meth:`handle_timeout` is wanted at the latest, in engine seconds; ``math.inf`` for never."""
         return math.inf if self._is_closed else self.alarms.next_deadline()
 
+    def network_changed(
+        self,
+        *,
+        unicast: tuple[Locator, ...],
+        multicast: tuple[Locator, ...],
+        announce_to: tuple[Locator, ...],
+        max_message_octets: int,
+        now: float,
+    ) -> None:
+        """Interfaces came or went: from now on we are reached there, and messages have at most that size.
+
+        Everybody is told, by SPDP; matches stay.  RTPS 2.5 §8.5.3.3: who hears other locators from us takes these.
+        """
+        if self._is_closed:
+            return
+        self.now = now
+        self.flush()
+        self._max_message_octets = max_message_octets
+        self.outbound.message_size_changed(max_message_octets, self.local_writers.values())
+        data = replace(
+            self.discovery.data, metatraffic_unicast=unicast, metatraffic_multicast=multicast, default_unicast=unicast
+        )
+        self.discovery.network_changed(data, announce_to, now)
+
     def drain_effects(self) -> list[Effect]:
         """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
         self.flush()

@@ -18,6 +18,7 @@ __all__ = [
     "can_gather",
     "enlarge_buffer",
     "list_interfaces",
+    "open_network_events",
     "receive_only_joined_groups",
 ]
 
@@ -33,13 +34,17 @@ can_gather = hasattr(socket.socket, "sendmsg")
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A network interface with an IPv4 address.  ``mtu`` in octets, as far as the platform tells it."""
+    """A network interface with an IPv4 address.  ``mtu`` in octets, as far as the platform tells it.
+
+    ``index``: the system's number for it, another one when an interface of the same name is made anew; 0 if not told.
+    """
 
     name: str
     address: str
     netmask: str
     mtu: int
     is_loopback: bool
+    index: int = 0
 
     def reaches(self, address: str) -> bool:
         """Is the address in this interface's own network?"""
@@ -66,13 +71,13 @@ if sys.platform != "win32":
     def _from_ioctl() -> list[Interface]:
         interfaces = []
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            for _, name in socket.if_nameindex():
-                interface = _interface(probe, name)
+            for index, name in socket.if_nameindex():
+                interface = _interface(probe, name, index)
                 if interface is not None:
                     interfaces.append(interface)
         return interfaces
 
-    def _interface(probe: socket.socket, name: str) -> Interface | None:
+    def _interface(probe: socket.socket, name: str, index: int) -> Interface | None:
         request = struct.pack("256s", name.encode()[:15])
 
         def ask(code: int) -> bytes:
@@ -88,7 +93,7 @@ if sys.platform != "win32":
             (mtu,) = struct.unpack_from("i", ask(get_mtu), 16)
         except OSError:  # it has no IPv4 address, or went away while we asked
             return None
-        return Interface(name, address, netmask, mtu, bool(flags & _IFF_LOOPBACK))
+        return Interface(name, address, netmask, mtu, bool(flags & _IFF_LOOPBACK), index)
 
 else:
 
@@ -104,6 +109,25 @@ def _from_getaddrinfo() -> list[Interface]:
         if not host.startswith("127."):
             interfaces.append(Interface(host, host, "255.255.255.0", _ETHERNET_MTU, is_loopback=False))
     return interfaces
+
+
+def open_network_events() -> socket.socket | None:
+    """A socket that becomes readable when an interface or an IPv4 address comes or goes; None: look now and then.
+
+    Linux: rtnetlink(7), the groups RTMGRP_LINK and RTMGRP_IPV4_IFADDR.  Some sandboxes have none of it.
+    """
+    if sys.platform != "linux":
+        return None
+    try:
+        sock = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW | socket.SOCK_NONBLOCK, socket.NETLINK_ROUTE)
+    except OSError:
+        return None
+    try:
+        sock.bind((0, 0x1 | 0x10))
+    except OSError:
+        sock.close()
+        return None
+    return sock
 
 
 def allow_shared_port(sock: socket.socket) -> None:

@@ -15,7 +15,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from random import SystemRandom
 from typing import TYPE_CHECKING
@@ -28,6 +28,7 @@ from ..spi import load_hooks
 from ..structure.guid import GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos_policies import Properties
+from .interface_watch import watch_interfaces
 from .udp import UdpTransport
 
 if TYPE_CHECKING:
@@ -143,6 +144,7 @@ class Pump:
                 nursery.start_soon(self._keep_time, name="ddsi timer")
                 nursery.start_soon(self._flush_when_idle, name="ddsi flush")
                 nursery.start_soon(self._send_backlog, name="ddsi send")
+                nursery.start_soon(watch_interfaces, self.follow_interfaces, name="ddsi interfaces")
                 while self._jobs:
                     nursery.start_soon(self._compute, self._jobs.pop(0))
                 while self._calls:
@@ -168,7 +170,10 @@ class Pump:
         view = memoryview(buffer)
         engine, locator_of = self.engine, self.transport.locator_of
         while not self.is_closed:
-            await trio.lowlevel.wait_readable(sock)
+            try:
+                await trio.lowlevel.wait_readable(sock)
+            except trio.ClosedResourceError:  # its interface is gone
+                return
             now = trio.current_time()
             for _ in range(_BATCH):
                 try:
@@ -176,7 +181,7 @@ class Pump:
                 except BlockingIOError:
                     break
                 except OSError:
-                    if self.is_closed:  # since this task was woken
+                    if sock.fileno() < 0:  # closed since this task was woken
                         return
                     continue  # an ICMP error for something sent before; it is not about this socket
                 engine.receive_datagram(view[:octets], locator_of(address), now)
@@ -206,7 +211,8 @@ class Pump:
         """What the system's buffer did not take at once, in order, when it does."""
         while not self.is_closed:
             if self._backlog:
-                await trio.lowlevel.wait_writable(self.transport.blocked or self.transport.unicast[0])
+                with suppress(trio.ClosedResourceError):  # its interface is gone: the next one decides
+                    await trio.lowlevel.wait_writable(self.transport.blocked or self.transport.unicast[0])
                 self._send_backlog_now()
             else:
                 await self._backlog_waiting.park()
@@ -215,6 +221,25 @@ class Pump:
         backlog = self._backlog
         while backlog and self.transport.send(backlog[0][0].parts, backlog[0][1]):
             backlog.popleft()
+
+    def follow_interfaces(self) -> None:
+        """Read from the interfaces that are there now, and announce where we are, if that is news."""
+        change = self.transport.refresh()
+        if change is None or self._nursery is None:
+            return
+        for sock in change.abandoned:
+            trio.lowlevel.notify_closing(sock)
+            sock.close()
+        for sock in change.opened:
+            self._nursery.start_soon(self._receive, sock, name="ddsi receive")
+        self.engine.network_changed(
+            unicast=self.transport.unicast_locators(),
+            multicast=self.transport.multicast_locators(),
+            announce_to=self.transport.announce_to(),
+            max_message_octets=self.transport.max_message_octets,
+            now=self.now(),
+        )
+        self.settle()
 
     # --- effects -----------------------------------------------------------------------------------------
 

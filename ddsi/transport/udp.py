@@ -2,6 +2,7 @@
 
 One unicast socket per chosen interface, all on the same port, for builtin and user traffic alike; one socket for the
 multicast group of the domain.  Unicast ports are never shared: two sockets on one port would split the traffic.
+Interfaces come and go while a participant lives; :meth:`UdpTransport.refresh` follows them.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import ipaddress
 import socket
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 
 from ..config import Config
 from ..structure.errors import ConfigurationError, OutOfResources
@@ -25,7 +27,7 @@ from .platform import (
     receive_only_joined_groups,
 )
 
-__all__ = ["UdpTransport"]
+__all__ = ["NetworkChange", "UdpTransport"]
 
 _LOOPBACK_MESSAGE = 65000
 _LEAST_MESSAGE = 548  # what every IPv4 host takes (RFC 791), less the headers
@@ -37,13 +39,23 @@ _EPHEMERAL = 0
 Octets = bytes | bytearray | memoryview
 
 
+@dataclass(frozen=True, slots=True)
+class NetworkChange:
+    """What :meth:`UdpTransport.refresh` did: sockets to be read from now on, and those that the caller is to close."""
+
+    opened: list[socket.socket]
+    abandoned: list[socket.socket]
+
+
 class UdpTransport:
     """Opened at once by the constructor; :meth:`close` closes all.  Raises ConfigurationError, OutOfResources."""
 
     def __init__(
         self, domain_id: int, config: Config, interfaces: Callable[[], list[Interface]] = list_interfaces
     ) -> None:
+        self._list_interfaces = interfaces
         self.interfaces = _choose(interfaces(), config.interfaces)
+        self._is_cut_off = False  # none of the interfaces that we may use is there
         self.uses_multicast = config.multicast is not False
         self._config = config
         self._domain_id = domain_id
@@ -53,6 +65,7 @@ class UdpTransport:
         self.participant_index: int | None = None
         self._by_locator: dict[Locator, tuple[tuple[str, int], Sequence[socket.socket]]] = {}
         self._locators: dict[tuple[str, int], Locator] = {}
+        self._peers: dict[str, list[Locator]] = {}
         try:
             self._open_unicast()
             if self.uses_multicast:
@@ -84,7 +97,7 @@ class UdpTransport:
 
     def unicast_locators(self) -> tuple[Locator, ...]:
         """Where this participant can be reached; loopback only when there is nothing else."""
-        return tuple(Locator.udp_v4(interface.address, self.port) for interface in self.interfaces)
+        return tuple(Locator.udp_v4(*sock.getsockname()) for sock in self.unicast)
 
     def multicast_locators(self) -> tuple[Locator, ...]:
         if self.multicast is None:
@@ -99,7 +112,9 @@ class UdpTransport:
         if not peers and any(interface.is_loopback for interface in self.interfaces):
             peers = ("127.0.0.1",)
         for peer in peers:
-            destinations.extend(self._peer_locators(peer))
+            if peer not in self._peers:  # asked once: a name server that is out of reach must not hold us up later
+                self._peers[peer] = self._peer_locators(peer)
+            destinations.extend(self._peers[peer])
         own = set(self.unicast_locators())
         return tuple(locator for locator in dict.fromkeys(destinations) if locator not in own)
 
@@ -143,21 +158,29 @@ class UdpTransport:
         """One socket per interface on this port, or none at all."""
         opened: list[socket.socket] = []
         for interface in self.interfaces:
-            sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            opened.append(sock)
-            sock.setblocking(False)
             try:
-                sock.bind((interface.address, port))
+                sock = self._bind(interface, port)
             except OSError as error:
                 for other in opened:
                     other.close()
                 if error.errno in (errno.EADDRINUSE, errno.EACCES):
                     return False
                 raise ConfigurationError(f"cannot listen on {interface.address}:{port}: {error}") from error
+            opened.append(sock)
             port = sock.getsockname()[1]
-            self._set_options(sock, interface)
         self.unicast = opened
         return True
+
+    def _bind(self, interface: Interface, port: int) -> socket.socket:
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            sock.setblocking(False)
+            sock.bind((interface.address, port))
+            self._set_options(sock, interface)
+        except BaseException:
+            sock.close()
+            raise
+        return sock
 
     def _set_options(self, sock: socket.socket, interface: Interface) -> None:
         enlarge_buffer(sock, socket.SO_RCVBUF, self._config.receive_buffer_size)
@@ -183,15 +206,88 @@ class UdpTransport:
                 "another domain, or do without multicast: Config(multicast=False, peers=...)"
             ) from error
         enlarge_buffer(sock, socket.SO_RCVBUF, self._config.receive_buffer_size)
-        joined = 0
-        for interface in self.interfaces:
-            membership = socket.inet_aton(group) + socket.inet_aton(interface.address)
-            with suppress(OSError):
-                sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-                joined += 1
-        if not joined:
+        if not self._join(sock):
             sock.close()
             self.multicast = None
+
+    def _join(self, sock: socket.socket) -> int:
+        """Become a member of the group on every interface; returns on how many."""
+        joined = 0
+        for interface in self.interfaces:
+            with suppress(OSError):
+                sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, self._membership(interface))
+                joined += 1
+        return joined
+
+    def _leave(self, sock: socket.socket, interface: Interface) -> None:
+        with suppress(OSError):
+            sock.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, self._membership(interface))
+
+    def _membership(self, interface: Interface) -> bytes:
+        return socket.inet_aton(self._config.multicast_address) + socket.inet_aton(interface.address)
+
+    # --- interfaces that come and go ---------------------------------------------------------------------
+
+    def refresh(self) -> NetworkChange | None:
+        """Look at the interfaces again and follow them; None when there is nothing to do or nobody to tell.
+
+        While none of ours is there everything stays as it is: the one that went is the likeliest to return, and then
+        its socket, bound to the same address, works as before.  What we announce is said again then, and the group
+        joined anew, as a switch on the way may have forgotten both.
+        """
+        try:
+            present = _choose(self._list_interfaces(), self._config.interfaces, is_patient=True)
+        except OSError:
+            return None
+        if not present:
+            self._is_cut_off = True
+            return None
+        if present == self.interfaces and not self._is_cut_off:
+            return None
+        self._is_cut_off = False
+        return self._move_to(present)
+
+    def _move_to(self, present: list[Interface]) -> NetworkChange | None:
+        # By address, to which the socket is bound: the interface that bears it may be another one than before.
+        before = {interface.address: sock for interface, sock in zip(self.interfaces, self.unicast, strict=True)}
+        after: list[tuple[Interface, socket.socket]] = []
+        opened: list[socket.socket] = []
+        for interface in present:
+            kept = before.get(interface.address)
+            sock = self._rebind(interface) if kept is None else self._point_again(kept, interface)
+            if sock is not None:
+                after.append((interface, sock))
+                opened.extend([sock] if kept is None else [])
+        if not after:  # it went again while we looked
+            self._is_cut_off = True
+            return None
+        for interface in self.interfaces:
+            if self.multicast is not None:
+                self._leave(self.multicast, interface)
+        self.interfaces, self.unicast = [interface for interface, _ in after], [sock for _, sock in after]
+        self._by_locator.clear()
+        self.blocked = None
+        if self.multicast is not None:
+            self._join(self.multicast)
+        elif self.uses_multicast:
+            with suppress(OutOfResources):
+                self._open_multicast()
+            opened.extend([self.multicast] if self.multicast is not None else [])
+        return NetworkChange(opened, [sock for sock in before.values() if sock not in self.unicast])
+
+    def _rebind(self, interface: Interface) -> socket.socket | None:
+        """On our port, so that whoever knew the address finds us there again; on any other if somebody took it."""
+        for port in (self.port, _EPHEMERAL):
+            with suppress(OSError):
+                return self._bind(interface, port)
+        return None
+
+    def _point_again(self, sock: socket.socket, interface: Interface) -> socket.socket | None:
+        """Its multicast leaves through the interface that bears the address now."""
+        with suppress(OSError):
+            self._set_options(sock, interface)
+            return sock
+        return None
 
     # --- in and out --------------------------------------------------------------------------------------
 
@@ -258,8 +354,11 @@ class UdpTransport:
             sock.close()
 
 
-def _choose(available: list[Interface], wanted: tuple[str, ...]) -> list[Interface]:
-    """The interfaces named, by name or address; none named: all but loopback, or loopback when it is alone."""
+def _choose(available: list[Interface], wanted: tuple[str, ...], *, is_patient: bool = False) -> list[Interface]:
+    """The interfaces named, by name or address; none named: all but loopback, or loopback when it is alone.
+
+    ``is_patient``: those that are not there may come back, so that they are no error.
+    """
     if not wanted:
         outward = [interface for interface in available if not interface.is_loopback]
         chosen = outward or available
@@ -267,12 +366,12 @@ def _choose(available: list[Interface], wanted: tuple[str, ...]) -> list[Interfa
         chosen = []
         for name in wanted:
             found = [interface for interface in available if name in (interface.name, interface.address)]
-            if not found:
+            if not found and not is_patient:
                 names = ", ".join(f"{interface.name} ({interface.address})" for interface in available) or "none"
                 raise ConfigurationError(
                     f"there is no interface {name!r} that is up and has an IPv4 address; there are: {names}"
                 )
             chosen.extend(interface for interface in found if interface not in chosen)
-    if not chosen:
+    if not chosen and not is_patient:
         raise ConfigurationError("no network interface is up, not even loopback")
     return chosen

@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import socket
+import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -13,12 +14,14 @@ from typing import Any
 
 import pytest
 import trio
+import trio.testing
 
 from ddsi.config import Config
 from ddsi.engine import Compute, Effect, SendDatagram
 from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.locator import Locator
-from ddsi.transport import Pump, PumpOptions
+from ddsi.transport import Pump, PumpOptions, interface_watch
+from ddsi.transport.platform import Interface, open_network_events
 
 _counter = itertools.count()
 
@@ -278,3 +281,88 @@ def test_a_trace_file_that_cannot_be_opened_is_a_configuration_error_and_leaves_
         Pump(PumpOptions(domain_id=of.domain_id, config=Config(interfaces=("lo",), participant_index=0)), print).close()
 
     trio.run(run)
+
+
+# --- interfaces that come and go -------------------------------------------------------------------------
+
+
+@in_trio
+async def test_a_new_address_is_read_and_announced_and_an_old_one_is_closed() -> None:
+    here, there = (Interface("lo", f"127.0.0.{n}", "255.0.0.0", 65536, is_loopback=True) for n in (1, 2))
+    async with running() as pump:
+        (old,) = pump.transport.unicast
+        heard: list[Locator] = []
+        engine: Any = pump.engine
+        engine.receive_datagram = lambda octets, source, now: heard.append(source)
+        pump.transport._list_interfaces = lambda: [there]
+        pump.follow_interfaces()
+        assert old.fileno() == -1
+        assert [locator.host for locator in pump.engine.discovery.data.default_unicast] == ["127.0.0.2"]
+        pump.follow_interfaces()  # nothing new
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind(("127.0.0.1", 0))
+            sender.sendto(b"octets", pump.transport.unicast[0].getsockname())
+            source = Locator.udp_v4(*sender.getsockname())
+            while source not in heard:
+                await trio.sleep(0.001)
+        pump.transport._list_interfaces = lambda: [here, there]
+        pump.follow_interfaces()
+        assert len(pump.transport.unicast) == 2
+
+
+@in_trio
+async def test_what_waits_for_a_socket_that_is_closed_goes_through_another() -> None:
+    there = Interface("lo", "127.0.0.2", "255.0.0.0", 65536, is_loopback=True)
+    async with running() as pump:
+        gate = Gate(pump)
+        gate.is_open = False
+        pump._act_on([SendDatagram((SOMEBODY,), [b"patient"])])
+        await trio.sleep(0.01)
+        pump.transport._list_interfaces = lambda: [there]
+        pump.follow_interfaces()
+        gate.is_open = True
+        while b"patient" not in gate.sent:
+            await trio.sleep(0.001)
+
+
+def test_the_interfaces_are_looked_at_when_the_system_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        system, ours = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+        ours.setblocking(False)
+        monkeypatch.setattr(interface_watch, "open_network_events", lambda: ours)
+        looks: list[float] = []
+        async with trio.open_nursery() as nursery:
+            nursery.start_soon(interface_watch.watch_interfaces, lambda: looks.append(trio.current_time()))
+            await trio.testing.wait_all_tasks_blocked()
+            assert len(looks) == 1
+            for _ in range(20):  # one change is several events
+                system.send(b"event")
+            with trio.fail_after(5):
+                while len(looks) < 2:
+                    await trio.sleep(0.01)
+            await trio.sleep(0.3)
+            assert len(looks) == 2
+            nursery.cancel_scope.cancel()
+        assert ours.fileno() == -1
+        system.close()
+
+    trio.run(main)
+
+
+def test_without_such_a_system_they_are_looked_at_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        monkeypatch.setattr(interface_watch, "open_network_events", lambda: None)
+        looks: list[float] = []
+        with trio.move_on_after(21):
+            await interface_watch.watch_interfaces(lambda: looks.append(trio.current_time()))
+        assert len(looks) == 5
+
+    trio.run(main, clock=trio.testing.MockClock(autojump_threshold=0))
+
+
+def test_this_system_tells_of_its_interfaces() -> None:
+    """On Linux; elsewhere there is nothing to listen to."""
+    events = open_network_events()
+    assert (events is not None) == sys.platform.startswith("linux")
+    if events is not None:
+        events.close()

@@ -7,6 +7,7 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -236,6 +237,137 @@ def test_the_tables_of_addresses_are_bounded(domain: int) -> None:
         for port in range(1, 6000):
             transport._route(Locator.udp_v4("127.0.0.1", port))
         assert len(transport._by_locator) <= 4096
+
+
+# --- interfaces that come and go -------------------------------------------------------------------------
+
+ANOTHER = Interface("lo", "127.0.0.2", "255.0.0.0", 65536, is_loopback=True)
+
+
+@contextmanager
+def moving(domain: int, there: list[Interface], **settings: Any) -> Iterator[UdpTransport]:
+    """A transport on a host whose interfaces are what the list holds at the time."""
+    transport = UdpTransport(domain, Config(**{"interfaces": ("lo",), **settings}), lambda: list(there))
+    try:
+        yield transport
+    finally:
+        transport.close()
+
+
+def hears_multicast(transport: UdpTransport) -> bool:
+    (group,) = transport.multicast_locators()
+    assert transport.send([b"to all"], group)
+    assert transport.multicast is not None
+    transport.multicast.settimeout(2)
+    try:
+        return transport.multicast.recv(100) == b"to all"
+    finally:
+        transport.multicast.setblocking(False)
+
+
+def test_nothing_is_done_when_nothing_has_changed(domain: int) -> None:
+    with opened(domain) as transport:
+        assert transport.refresh() is None
+
+
+def test_an_interface_that_returns_is_used_as_before(domain: int) -> None:
+    """Meanwhile its socket waits; then it is time to be heard again."""
+    there = [LOOPBACK]
+    with moving(domain, there) as transport:
+        locators, (sock,) = transport.unicast_locators(), transport.unicast
+        there.clear()
+        assert transport.refresh() is None
+        assert transport.unicast_locators() == locators
+        there.append(replace(LOOPBACK, index=7))  # as after it was made anew
+        change = transport.refresh()
+        assert change is not None
+        assert (change.opened, change.abandoned) == ([], [])
+        assert (transport.unicast_locators(), transport.unicast) == (locators, [sock])
+        assert hears_multicast(transport)
+        assert transport.refresh() is None
+
+
+def test_an_address_that_comes_is_used_at_the_same_port(domain: int) -> None:
+    there = [LOOPBACK]
+    with moving(domain, there) as transport:
+        port = transport.port
+        there.append(ANOTHER)
+        change = transport.refresh()
+        assert change is not None
+        assert (change.opened, change.abandoned) == ([transport.unicast[1]], [])
+        assert transport.unicast_locators() == (Locator.udp_v4("127.0.0.1", port), Locator.udp_v4("127.0.0.2", port))
+
+
+def test_an_address_that_goes_is_announced_no_more(domain: int) -> None:
+    there = [LOOPBACK, ANOTHER]
+    with moving(domain, there) as transport:
+        port, (_, second) = transport.port, transport.unicast
+        there.remove(ANOTHER)
+        change = transport.refresh()
+        assert change is not None
+        assert (change.opened, change.abandoned) == ([], [second])
+        assert transport.unicast_locators() == (Locator.udp_v4("127.0.0.1", port),)
+        assert hears_multicast(transport)
+        second.close()
+
+
+def test_a_host_that_moves_is_reached_at_its_new_address(domain: int) -> None:
+    there = [LOOPBACK]
+    with moving(domain, there) as transport, opened(domain) as other:
+        there[:] = [ANOTHER]
+        change = transport.refresh()
+        assert change is not None
+        for sock in change.abandoned:
+            sock.close()
+        (here,) = transport.unicast_locators()
+        assert here.host == "127.0.0.2"
+        assert other.send([b"moved?"], here)
+        assert received(transport) == b"moved?"
+
+
+def test_where_somebody_took_our_port_another_one_is_announced(domain: int) -> None:
+    there = [LOOPBACK]
+    with moving(domain, there) as transport, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as squatter:
+        squatter.bind(("127.0.0.2", transport.port))
+        there.append(ANOTHER)
+        assert transport.refresh() is not None
+        first, second = transport.unicast_locators()
+        assert second.port not in (0, first.port)
+
+
+def test_a_host_that_loses_its_network_talks_to_itself_until_it_returns(domain: int) -> None:
+    """The rule of the start holds at any time: all but loopback, or loopback when it is alone."""
+    wireless = Interface("wlan0", "127.0.0.2", "255.255.255.0", 1500, is_loopback=False)
+    there = [LOOPBACK, wireless]
+    with moving(domain, there, interfaces=()) as transport:
+        assert (transport.interfaces, transport.max_message_octets) == ([wireless], 1472)
+        for now_there, octets in ([LOOPBACK], 65_000), ([LOOPBACK, wireless], 1472):
+            there[:] = now_there
+            change = transport.refresh()
+            assert change is not None
+            for sock in change.abandoned:
+                sock.close()
+            assert (transport.interfaces, transport.max_message_octets) == ([now_there[-1]], octets)
+
+
+def test_multicast_begins_where_the_first_interface_had_none(domain: int) -> None:
+    there = [LOOPBACK]
+    with moving(domain, there, multicast_address="239.255.0.9") as transport:
+        assert transport.multicast is not None
+        transport.multicast.close()
+        transport.multicast = None
+        there.append(ANOTHER)
+        change = transport.refresh()
+        assert change is not None
+        assert transport.multicast in change.opened
+
+
+def test_names_of_peers_are_looked_up_once(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name server that went with the network must not hold up what is still there."""
+    with opened(domain, peers=("localhost",)) as transport:
+        before = transport.announce_to()
+        monkeypatch.setattr(socket, "gethostbyname", None)
+        assert transport.announce_to() == before
 
 
 def test_closing_closes_every_socket(domain: int) -> None:
