@@ -23,6 +23,7 @@ The names below are the public face; everything else may change.
 from .config import Config
 from .config.secure import secure
 from .dcps import (
+    BuiltinTopicReader,
     DataReader,
     DataWriter,
     DomainParticipant,
@@ -33,6 +34,11 @@ from .dcps import (
     Sample,
     Subscriber,
     Topic,
+)
+from .structure.builtin_topic_data import (
+    ParticipantBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
 )
 from .structure.errors import (
     AlreadyDeleted,
@@ -90,6 +96,7 @@ from .structure.qos_policies import (
     WriterDataLifecycle,
 )
 from .structure.sample_info import InstanceState, SampleInfo, SampleState, ViewState
+from .structure.security_information import EndpointSecurity, ParticipantSecurity
 from .structure.status import (
     Incompatibility,
     InconsistentTopic,
@@ -124,6 +131,7 @@ __all__ = [
     "BadParameter",
     "BestEffort",
     "BinaryProperty",
+    "BuiltinTopicReader",
     "ByReceptionTimestamp",
     "BySourceTimestamp",
     "Config",
@@ -139,6 +147,7 @@ __all__ = [
     "DomainParticipant",
     "DurabilityService",
     "EndpointQos",
+    "EndpointSecurity",
     "Entity",
     "EntityFactory",
     "EventStream",
@@ -164,11 +173,14 @@ __all__ = [
     "OfferedIncompatibleQos",
     "OutOfResources",
     "OwnershipStrength",
+    "ParticipantBuiltinTopicData",
+    "ParticipantSecurity",
     "Partition",
     "Persistent",
     "PreconditionNotMet",
     "Presentation",
     "Property",
+    "PublicationBuiltinTopicData",
     "PublicationMatched",
     "Publisher",
     "Qos",
@@ -188,6 +200,7 @@ __all__ = [
     "Shared",
     "Status",
     "Subscriber",
+    "SubscriptionBuiltinTopicData",
     "SubscriptionMatched",
     "Time",
     "TimeBasedFilter",

@@ -1,5 +1,6 @@
 """What an application holds: participant, topic, writer, reader, conditions, statuses (DDS 1.4 §2.2, DCPS)."""
 
+from .builtin_topic_reader import BuiltinTopicReader
 from .conditions import ReadCondition
 from .data_reader import DataReader
 from .data_writer import DataWriter
@@ -10,6 +11,7 @@ from .sample import Sample
 from .topic import Topic
 
 __all__ = [
+    "BuiltinTopicReader",
     "DataReader",
     "DataWriter",
     "DomainParticipant",

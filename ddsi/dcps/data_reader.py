@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import trio
 
-from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
-from ..engine import KeyCodec, LocalReader
+from ..behavior.reader_history_cache import ReaderHistoryCache
+from ..engine import KeyCodec, LocalReader, publication_data
+from ..structure.builtin_topic_data import PublicationBuiltinTopicData
 from ..structure.cache_change import CacheChange
-from ..structure.errors import DdsTimeout, MalformedSample
+from ..structure.errors import BadParameter, DdsTimeout, MalformedSample
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, reader_qos
 from ..structure.qos_policies import DataRepresentation, DataRepresentationId
-from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
+from ..structure.sample_info import SampleInfo
 from ..structure.status import (
     InconsistentTopic,
     LivelinessChanged,
@@ -27,10 +27,10 @@ from ..structure.status import (
     Status,
     SubscriptionMatched,
 )
-from .conditions import ReadCondition
-from .entity import Entity, deadline_scope
+from .entity import deadline_scope
 from .groups import Subscriber, check_family
 from .sample import Sample
+from .sample_reader import SampleReader
 from .topic import Topic
 
 if TYPE_CHECKING:
@@ -41,10 +41,9 @@ __all__ = ["DataReader"]
 T = TypeVar("T")
 
 _LOOK_FOR_HISTORY_S = 0.005
-_UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
 
 
-class DataReader(Entity, Generic[T]):
+class DataReader(SampleReader[T]):
     """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``, which never wait."""
 
     STATUSES: ClassVar[tuple[type, ...]] = (
@@ -65,18 +64,15 @@ class DataReader(Entity, Generic[T]):
         """
         participant = check_family(parent, topic, Subscriber)
         group_qos = parent.qos if isinstance(parent, Subscriber) else Qos()
-        super().__init__(qos)
+        super().__init__(participant, qos)
         self._qos = topic.qos | group_qos | self._qos
         self._parent = parent
-        self._participant = participant
         self._topic = topic
         support = topic.type_support
         self._deserialize = support.deserialize
         self._deserialize_key = support.deserialize_key
         self._endpoint_qos = _with_representations(reader_qos(self._qos))
-        self._news = trio.lowlevel.ParkingLot()
         self._undecodable: list[CacheChange] = []
-        self._pump = participant._running_pump()
         self._reader: LocalReader = self._pump.engine.create_reader(
             topic.name,
             support.type_name,
@@ -107,86 +103,6 @@ class DataReader(Entity, Generic[T]):
     def endpoint_qos(self) -> EndpointQos:
         """Every policy as it holds for this reader, defaults filled in."""
         return self._endpoint_qos
-
-    # --- reading -----------------------------------------------------------------------------------------
-
-    def __aiter__(self) -> DataReader[T]:
-        return self
-
-    async def __anext__(self) -> Sample[T]:
-        """Take the next sample, waiting for one.  Iteration ends when the reader is closed.
-
-        Raises NotAllowedBySecurity when it was closed because its participant's rights have ended.
-        """
-        await self._pump.checkpoint(self._pump.now())
-        while not self._is_closed:
-            taken = self._history.take_next()
-            if taken is not None:
-                sample = self._sample(*taken)
-                self._after_taking()
-                if sample is not None:
-                    return sample
-                continue
-            await self._wait_for_news()
-        self._check_not_revoked()
-        raise StopAsyncIteration
-
-    def take(
-        self,
-        max_samples: int | None = None,
-        *,
-        condition: ReadCondition | None = None,
-        sample_states: int = ANY_SAMPLE_STATE,
-        view_states: int = ANY_VIEW_STATE,
-        instance_states: int = ANY_INSTANCE_STATE,
-        instance: bytes | None = None,
-    ) -> list[Sample[T]]:
-        """Samples that are here now, oldest first, removed from the reader; never waits.
-
-        ``max_samples``: at most so many.  Masks select by state, ``condition`` brings masks of its own,
-        ``instance`` (an ``info.instance_handle``) selects one instance.  Raises AlreadyDeleted.
-        """
-        self._check_open()
-        states, selector = self._selection(condition, sample_states, view_states, instance_states)
-        self._history.seen()
-        taken = self._history.take(max_samples, **states, instance=instance, selector=selector)
-        samples = [sample for info, change in taken if (sample := self._sample(info, change)) is not None]
-        self._drop_undecodable()
-        self._after_taking()
-        return samples
-
-    def read(
-        self,
-        max_samples: int | None = None,
-        *,
-        condition: ReadCondition | None = None,
-        sample_states: int = ANY_SAMPLE_STATE,
-        view_states: int = ANY_VIEW_STATE,
-        instance_states: int = ANY_INSTANCE_STATE,
-        instance: bytes | None = None,
-    ) -> list[Sample[T]]:
-        """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
-        self._check_open()
-        states, selector = self._selection(condition, sample_states, view_states, instance_states)
-        self._history.seen()
-        found = self._history.read(max_samples, **states, instance=instance, selector=selector)
-        samples = [sample for info, change in found if (sample := self._sample(info, change)) is not None]
-        self._drop_undecodable()
-        return samples
-
-    async def wait(self, condition: ReadCondition | None = None) -> None:
-        """Until there is a sample that fits ``condition`` (none given: one that has not been read).
-
-        Raises AlreadyDeleted, also when the reader is closed meanwhile.
-        """
-        self._check_open()
-        await self._pump.checkpoint(self._pump.now())
-        states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
-        while not self._history.matches(selector=selector, **states):
-            self._drop_undecodable()
-            self._check_open()
-            await self._wait_for_news()
-        self._drop_undecodable()
 
     def lookup_instance(self, sample: T) -> bytes | None:
         """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
@@ -223,17 +139,20 @@ class DataReader(Entity, Generic[T]):
         """The Guids of the writers that are matched now."""
         return list(self._reader.behavior.writers)
 
+    def matched_publication_data(self, handle: Guid) -> PublicationBuiltinTopicData:
+        """What is known of a writer that is matched now: its QoS, and of its security who writes, and how protected.
+
+        ``handle``: its Guid, of :meth:`matched_publications` or a sample's ``info.publication_handle``.  A writer of
+        our own participant is known too.  Raises BadParameter when it is not matched, or no longer; a
+        BuiltinTopicReader still has the data of one that is gone.  DDS 1.4 §2.2.2.5.3 (get_matched_publication_data).
+        """
+        self._check_open()
+        proxy = self._reader.behavior.writers.get(handle)
+        if proxy is None:
+            raise BadParameter(f"reader of {self._topic.name!r}: writer {handle!r} is not matched, or no longer")
+        return publication_data(proxy.data, self._pump.engine.hooks)
+
     # --- inside ------------------------------------------------------------------------------------------
-
-    async def _wait_for_news(self) -> None:
-        """Until something may have changed.  What this task has written must not wait meanwhile."""
-        self._history.seen()
-        self._pump.before_waiting()
-        await self._news.park()
-
-    def _has_news(self) -> None:
-        self._news.unpark_all()
-        self._changed.unpark_all()
 
     def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
         """The sample as an object; None, and counted as lost, if its octets are not one."""
@@ -267,28 +186,6 @@ class DataReader(Entity, Generic[T]):
             self._pump.engine.samples_taken(self._reader, self._pump.now())
             self._pump.settle()
 
-    def _selection(
-        self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int
-    ) -> tuple[dict[str, int], SampleSelector | None]:
-        selector: SampleSelector | None = None
-        if condition is not None:
-            sample_states &= condition.sample_states
-            view_states &= condition.view_states
-            instance_states &= condition.instance_states
-            query = condition.query
-            if query is not None:
-                selector = self._selector(query)
-        states = {"sample_states": sample_states, "view_states": view_states, "instance_states": instance_states}
-        return states, selector
-
-    def _selector(self, query: Callable[[T], bool]) -> SampleSelector:
-        def selects(info: SampleInfo) -> bool:
-            change = info.change
-            sample = self._sample(info, change) if change is not None else None
-            return sample is not None and bool(query(sample.data))
-
-        return selects
-
     def _status_changed(self, status: Status) -> None:
         if isinstance(status, InconsistentTopic):
             self._topic._found_inconsistent(status.remote_type_name)
@@ -296,7 +193,7 @@ class DataReader(Entity, Generic[T]):
 
     def _on_close(self) -> None:
         self._parent._disown(self)
-        self._news.unpark_all()
+        super()._on_close()
         self._participant._deregister(self._reader.guid)
         self._participant._when_running(lambda pump: pump.engine.delete_reader(self._reader, pump.now()))
 

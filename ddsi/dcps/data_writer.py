@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 import trio
 
-from ..engine import LocalWriter
+from ..engine import LocalWriter, subscription_data
+from ..structure.builtin_topic_data import SubscriptionBuiltinTopicData
 from ..structure.cache_change import ChangeKind
 from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
@@ -232,6 +233,19 @@ class DataWriter(Entity, Generic[T]):
     def matched_subscriptions(self) -> list[Guid]:
         """The Guids of the readers that are matched now."""
         return [*self._writer.behavior.readers, *self._writer.behavior.local_readers]
+
+    def matched_subscription_data(self, handle: Guid) -> SubscriptionBuiltinTopicData:
+        """What is known of a reader that is matched now: its QoS, and of its security who reads, and how protected.
+
+        ``handle``: its Guid, of :meth:`matched_subscriptions`.  A reader of our own participant is known too.  Raises
+        BadParameter when it is not matched, or no longer.  DDS 1.4 §2.2.2.4.2 (get_matched_subscription_data).
+        """
+        self._check_open()
+        behavior = self._writer.behavior
+        proxy = behavior.readers.get(handle) or behavior.local_readers.get(handle)
+        if proxy is None:
+            raise BadParameter(f"writer of {self._topic.name!r}: reader {handle!r} is not matched, or no longer")
+        return subscription_data(proxy.data, self._pump.engine.hooks)
 
     def assert_liveliness(self) -> None:
         """Say that this writer is alive, where its liveliness is manual.  DDS 1.4 §2.2.2.4.2.22."""

@@ -17,8 +17,17 @@ from ..config import Config
 from ..config.environment import load_config
 from ..config.secure import participant_properties
 from ..discovery.matching import MatchRefusal
-from ..engine import DataAvailable, DiscoveryChanged, Effect, LocalWriter, StatusChanged, WriterProgress
+from ..engine import (
+    DataAvailable,
+    DiscoveryChanged,
+    Effect,
+    LocalWriter,
+    StatusChanged,
+    WriterProgress,
+    participant_data,
+)
 from ..structure import builtin_entity_ids as ids
+from ..structure.builtin_topic_data import ParticipantBuiltinTopicData
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
@@ -166,6 +175,22 @@ class DomainParticipant(Parent):
     def discovered_participants(self) -> list[DiscoveredParticipantData]:
         """The remote participants that are known now, without those that security has not admitted (yet)."""
         return [proxy.data for proxy in self._running_pump().engine.participants.values() if proxy.is_admitted]
+
+    def discovered_participant_data(self, handle: Guid) -> ParticipantBuiltinTopicData:
+        """What is known of a participant: what it announces of itself, and who it is where it is authenticated.
+
+        ``handle``: its Guid, the ``participant_key`` of an endpoint's data; our own participant's is known too.  Raises
+        BadParameter when there is none, or security has not admitted it.
+
+        DDS 1.4 §2.2.2.2.1 (get_discovered_participant_data).
+        """
+        engine = self._running_pump().engine
+        if handle == engine.guid:
+            return participant_data(engine.discovery.data, engine.hooks)
+        proxy = engine.participants.get(handle[:12])
+        if proxy is None or proxy.guid != handle or not proxy.is_admitted:
+            raise BadParameter(f"{self!r} knows no participant {handle!r}, or not yet, or no longer")
+        return participant_data(proxy.data, engine.hooks)
 
     def discovered_publications(self) -> list[DiscoveredWriterData]:
         """The remote writers that are known now."""

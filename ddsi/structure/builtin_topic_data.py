@@ -80,8 +80,9 @@ class _EndpointBuiltinTopicData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublicationBuiltinTopicData(_EndpointBuiltinTopicData):
-    """A writer.  ``key``: its Guid, which a sample's ``info.publication_handle`` is too.  ``qos``: every policy.
+    """A writer.  ``key``: its Guid, which a sample's ``info.publication_handle`` is too.
 
+    ``qos``: every policy; those that are not announced, as a remote writer's history, have their defaults.
     ``type_information``: the XTypes TypeInformation as it was announced; empty if it was not.
     """
 
@@ -90,8 +91,9 @@ class PublicationBuiltinTopicData(_EndpointBuiltinTopicData):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SubscriptionBuiltinTopicData(_EndpointBuiltinTopicData):
-    """A reader.  ``key``: its Guid.  ``qos``: every policy.  ``content_filter``: what it lets pass; None for all.
+    """A reader.  ``key``: its Guid.  ``content_filter``: what it lets pass; None for all.
 
+    ``qos``: every policy; those that are not announced, as a remote reader's history, have their defaults.
     ``type_information``: the XTypes TypeInformation as it was announced; empty if it was not.
     """
 

@@ -1,0 +1,169 @@
+"""SampleReader: read and take, wait, and ``async for``, of whoever holds samples for an application.
+
+DDS 1.4 §2.2.2.5.3 (DataReader): what readers of topics and readers of builtin topics share.  How a change in the cache
+becomes a sample is theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Generic, Self, TypeVar
+
+import trio
+
+from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
+from ..structure.cache_change import CacheChange
+from ..structure.qos import Qos
+from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
+from ..transport import Pump
+from .conditions import ReadCondition
+from .entity import Entity
+from .sample import Sample
+
+if TYPE_CHECKING:
+    from .participant import DomainParticipant
+
+__all__ = ["SampleReader"]
+
+T = TypeVar("T")
+
+_UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
+
+
+class SampleReader(Entity, Generic[T]):
+    """The base of DataReader and BuiltinTopicReader."""
+
+    _history: ReaderHistoryCache
+
+    def __init__(self, participant: DomainParticipant, qos: Qos | None) -> None:
+        super().__init__(qos)
+        self._participant = participant
+        self._pump: Pump = participant._running_pump()
+        self._news = trio.lowlevel.ParkingLot()
+
+    # --- reading -----------------------------------------------------------------------------------------
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> Sample[T]:
+        """Take the next sample, waiting for one.  Iteration ends when the reader is closed.
+
+        Raises NotAllowedBySecurity when it was closed because its participant's rights have ended.
+        """
+        await self._pump.checkpoint(self._pump.now())
+        while not self._is_closed:
+            taken = self._history.take_next()
+            if taken is not None:
+                sample = self._sample(*taken)
+                self._after_taking()
+                if sample is not None:
+                    return sample
+                continue
+            await self._wait_for_news()
+        self._check_not_revoked()
+        raise StopAsyncIteration
+
+    def take(
+        self,
+        max_samples: int | None = None,
+        *,
+        condition: ReadCondition | None = None,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+        instance: bytes | None = None,
+    ) -> list[Sample[T]]:
+        """Samples that are here now, oldest first, removed from the reader; never waits.
+
+        ``max_samples``: at most so many.  Masks select by state, ``condition`` brings masks of its own,
+        ``instance`` (an ``info.instance_handle``) selects one instance.  Raises AlreadyDeleted.
+        """
+        self._check_open()
+        states, selector = self._selection(condition, sample_states, view_states, instance_states)
+        self._history.seen()
+        taken = self._history.take(max_samples, **states, instance=instance, selector=selector)
+        samples = [sample for info, change in taken if (sample := self._sample(info, change)) is not None]
+        self._drop_undecodable()
+        self._after_taking()
+        return samples
+
+    def read(
+        self,
+        max_samples: int | None = None,
+        *,
+        condition: ReadCondition | None = None,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+        instance: bytes | None = None,
+    ) -> list[Sample[T]]:
+        """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
+        self._check_open()
+        states, selector = self._selection(condition, sample_states, view_states, instance_states)
+        self._history.seen()
+        found = self._history.read(max_samples, **states, instance=instance, selector=selector)
+        samples = [sample for info, change in found if (sample := self._sample(info, change)) is not None]
+        self._drop_undecodable()
+        return samples
+
+    async def wait(self, condition: ReadCondition | None = None) -> None:
+        """Until there is a sample that fits ``condition`` (none given: one that has not been read).
+
+        Raises AlreadyDeleted, also when the reader is closed meanwhile.
+        """
+        self._check_open()
+        await self._pump.checkpoint(self._pump.now())
+        states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
+        while not self._history.matches(selector=selector, **states):
+            self._drop_undecodable()
+            self._check_open()
+            await self._wait_for_news()
+        self._drop_undecodable()
+
+    # --- inside ------------------------------------------------------------------------------------------
+
+    def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
+        """The sample as an object; None if its octets are not one."""
+        raise NotImplementedError
+
+    def _on_close(self) -> None:
+        self._news.unpark_all()
+
+    def _after_taking(self) -> None:
+        """There is room again."""
+
+    def _drop_undecodable(self) -> None:
+        """What was found not to decode while it stays in the cache: nobody shall meet it again."""
+
+    async def _wait_for_news(self) -> None:
+        """Until something may have changed.  What this task has written must not wait meanwhile."""
+        self._history.seen()
+        self._pump.before_waiting()
+        await self._news.park()
+
+    def _has_news(self) -> None:
+        self._news.unpark_all()
+        self._changed.unpark_all()
+
+    def _selection(
+        self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int
+    ) -> tuple[dict[str, int], SampleSelector | None]:
+        selector: SampleSelector | None = None
+        if condition is not None:
+            sample_states &= condition.sample_states
+            view_states &= condition.view_states
+            instance_states &= condition.instance_states
+            query = condition.query
+            if query is not None:
+                selector = self._selector(query)
+        states = {"sample_states": sample_states, "view_states": view_states, "instance_states": instance_states}
+        return states, selector
+
+    def _selector(self, query: Callable[[T], bool]) -> SampleSelector:
+        def selects(info: SampleInfo) -> bool:
+            change = info.change
+            sample = self._sample(info, change) if change is not None else None
+            return sample is not None and bool(query(sample.data))
+
+        return selects
