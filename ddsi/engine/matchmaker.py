@@ -132,7 +132,10 @@ class Matchmaker:
             if self._refused(writer.guid, data.guid, data.topic_name, refusal):
                 self._tell(writer, data, refusal)
         elif matched:
-            writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
+            if self._still_admits(writer.guid, writer.behavior.readers[data.guid].data, data):
+                writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
+            else:
+                self._unmatch_reader(writer, data.guid, LossReason.REJECTED_BY_SECURITY, now)
         else:
             admission = engine.hooks.match(writer.guid, data)
             if self._admits(writer.guid, data.guid, data.topic_name, admission):
@@ -152,8 +155,11 @@ class Matchmaker:
             if self._refused(reader.guid, data.guid, data.topic_name, refusal):
                 self._tell(reader, data, refusal)
         elif proxy is not None:
-            proxy.data = data
-            proxy.locators = participant.user_traffic(data.unicast)
+            if self._still_admits(reader.guid, proxy.data, data):
+                proxy.data = data
+                proxy.locators = participant.user_traffic(data.unicast)
+            else:
+                self.unmatch_writer(reader, data.guid, LossReason.REJECTED_BY_SECURITY, now)
         else:
             admission = engine.hooks.match(reader.guid, data)
             if self._admits(reader.guid, data.guid, data.topic_name, admission):
@@ -304,6 +310,18 @@ class Matchmaker:
                 self._engine.status(local, SecurityRefused(remote=remote, reason=admission.reason))
             return False
         return True
+
+    def _still_admits(
+        self,
+        local: Guid,
+        before: DiscoveredWriterData | DiscoveredReaderData,
+        data: DiscoveredWriterData | DiscoveredReaderData,
+    ) -> bool:
+        """A matched endpoint announces something else: may it, with that partition and those data tags?"""
+        if data == before:
+            return True
+        admission = self._engine.hooks.match(local, data)
+        return not isinstance(admission, Refused) or self._admits(local, data.guid, data.topic_name, admission)
 
     def _refused(self, local: Guid, remote: Guid, topic_name: str, refusal: MatchRefusal) -> bool:
         """Remember it; returns whether it is news."""

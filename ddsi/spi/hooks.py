@@ -205,8 +205,8 @@ class SecurityHooks(Protocol):
         """May the local endpoint match the remote one (§8.4.2.9.10-11, §8.5.1.7.3-6)?  PENDING: keys are under way.
 
         Asked for pairs of builtin endpoints too, but SPDP's.  Before a participant is admitted only its
-        ParticipantStatelessMessage endpoints are asked about.  Asked again of a pair that is pending, or was refused,
-        when one of the two has changed.
+        ParticipantStatelessMessage endpoints are asked about.  Asked again of a pair that is pending, was refused, or is
+        matched, when one of the two has changed; a matched one stays so unless it is refused.
         """
         ...
 

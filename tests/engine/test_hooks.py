@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION
+from ddsi.engine import LocalReader, LocalWriter, StatusChanged
 from ddsi.engine.outbound import fragment_octets_for
 from ddsi.simulation import Domain, Node, invariants
 from ddsi.spi import (
@@ -36,10 +37,11 @@ from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.errors import NotAllowedBySecurity
 from ddsi.structure.guid import Guid, GuidPrefix
-from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import KeepAll, Partition, Reliable, TransientLocal
+from ddsi.structure.qos import Qos, reader_qos, writer_qos
+from ddsi.structure.qos_policies import DataTags, KeepAll, Partition, Reliable, TransientLocal
 from ddsi.structure.status import SecurityRefused
 from ddsi.trace.reasons import DropReason
+from tests.engine.wire import Stranger, engine
 
 RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
 
@@ -267,6 +269,37 @@ def test_a_refused_pair_is_kept_with_its_reason() -> None:
     assert b.statuses_of(SecurityRefused) == [
         SecurityRefused(remote=writer.guid, reason="partition p is not in its permissions")
     ]
+
+
+@pytest.mark.parametrize("is_writer", [False, True])
+def test_a_matched_endpoint_that_announces_something_else_is_asked_about_again(is_writer: bool) -> None:
+    """Else it could be let in with one partition, or one data tag, and go on with another."""
+    hooks = Hooks()
+    participant, stranger = engine(hooks=hooks), Stranger()
+    own: LocalWriter | LocalReader
+    if is_writer:
+        own = participant.create_reader("Square", "T", reader_qos(RELIABLE), 0.0, is_keyed=False)
+    else:
+        own = participant.create_writer("Square", "T", writer_qos(RELIABLE), 0.0, is_keyed=False)
+    announce = stranger.sedp_writer if is_writer else stranger.sedp_reader
+    stranger.introduce(participant)
+    for admission, qos, matched, asked in (
+        (ADMITTED, RELIABLE, 1, 1),
+        (ADMITTED, RELIABLE, 1, 1),  # the same again
+        (PENDING, RELIABLE | Qos(data_tags=DataTags(("colour", "red"))), 1, 2),
+        (Refused("not blue"), RELIABLE | Qos(data_tags=DataTags(("colour", "blue"))), 0, 3),
+        (ADMITTED, RELIABLE | Qos(data_tags=DataTags(("colour", "green"))), 1, 4),
+    ):
+        hooks.matches = admission
+        participant.receive_datagram(announce(qos=qos), stranger.address, 1.0)
+        assert (own.matched.current_count, hooks.asked.count("match")) == (matched, asked)
+    refusals = [
+        (effect.entity, effect.status.reason)
+        for effect in participant.drain_effects()
+        if isinstance(effect, StatusChanged) and isinstance(effect.status, SecurityRefused)
+    ]
+    assert refusals == [(own.guid, "not blue")]
+    assert hooks.asked.count("unmatch") == 1
 
 
 def test_slow_work_is_computed_elsewhere_and_comes_back() -> None:
