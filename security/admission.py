@@ -25,7 +25,7 @@ from .announced import info, participant_refusal, token
 from .authentication_plugin import Authentication, AuthStatusKind, RemoteIdentity
 from .generic_message import GenericMessage
 from .handles import HandshakeHandle, IdentityHandle, Pending, PermissionsHandle, SharedSecretHandle
-from .handshake import Authenticated, Failed, Handshake, Output, Reported, Send, Work
+from .handshake import Authenticated, Failed, Handshake, Output, Reported, Send, State, Work
 from .key_exchange import KeyExchange
 from .loading import Plugins
 from .logging_plugin import LogLevel
@@ -33,9 +33,12 @@ from .mailbox import Mailbox
 from .own_participant import OwnParticipant
 from .remote_participant import RemoteParticipant, Standing
 from .tokens import NIL, DataHolder
+from .waiting_room import WaitingRoom
 
-__all__ = ["AdmissionDesk"]
+__all__ = ["MAX_HANDSHAKE_OCTETS", "AdmissionDesk"]
 
+MAX_HANDSHAKE_OCTETS: Final = 1 << 16
+"""Of one message; certificate and permissions are in it.  Several of each participant may be kept."""
 _MAX_BANNED: Final = 1024
 _FORGOTTEN_AFTER_S: Final = 2.0
 _SECURE: Final = BuiltinEndpoints.PARTICIPANT_SECURE_WRITER
@@ -53,6 +56,7 @@ class AdmissionDesk:
         mailbox: Mailbox,
         effects: list[HookEffect],
         *,
+        max_handshakes: int,
         jitter: Callable[[], float],
         changed: Callable[[], None],
     ) -> None:
@@ -70,6 +74,7 @@ class AdmissionDesk:
         self._timers: list[tuple[float, int, RemoteParticipant]] = []
         self._timer_numbers = itertools.count()
         self._banned: dict[Guid, str] = {}
+        self._room = WaitingRoom(max_handshakes)
         plugins.authentication.set_listener(self)
         plugins.access_control.set_listener(self)
 
@@ -93,7 +98,8 @@ class AdmissionDesk:
         if difference:
             return self._unauthenticated(remote, f"its governance protects participants otherwise: {difference}")
         remote.handshake = self._handshake(remote, identity_token)
-        self._act(remote, remote.handshake, remote.handshake.begin(now), now)
+        self._room.enter(remote.guid)
+        self._call_next(now)
         return self._answer(remote)
 
     def changed(self, data: DiscoveredParticipantData, now: float) -> Admission:
@@ -103,11 +109,11 @@ class AdmissionDesk:
             return self.discovered(data, now)
         before, remote.data = remote.data, data
         if remote.standing is not Standing.ADMITTED and before.security_parameters != data.security_parameters:
-            self.lost(data.guid)
+            self.lost(data.guid, now)
             return self.discovered(data, now)
         return self._answer(remote)
 
-    def lost(self, guid: Guid) -> None:
+    def lost(self, guid: Guid, now: float) -> None:
         """Nothing of it stays."""
         remote = self._remotes.pop(guid.prefix, None)
         if remote is None:
@@ -116,6 +122,7 @@ class AdmissionDesk:
         for generation in [number for number, (subject, _) in self._jobs.items() if subject == guid]:
             del self._jobs[generation]
         self._changed()
+        self._call_next(now)
 
     def _handshake(self, remote: RemoteParticipant, identity_token: DataHolder) -> Handshake:
         authentication, own = self._plugins.authentication, self._own
@@ -164,11 +171,41 @@ class AdmissionDesk:
                 return
             identity_token = token(remote.data.security_parameters, ParameterId.IDENTITY_TOKEN)
             remote.renewal = self._handshake(remote, identity_token)
-            self._act(remote, remote.renewal, remote.renewal.begin(now), now)
-        if remote.renewal is not None:
-            self._act(remote, remote.renewal, remote.renewal.receive(message, now), now)
-        if not remote.handshake.is_begun_anew_by(message):
-            self._act(remote, remote.handshake, remote.handshake.receive(message, now), now)
+            self._room.enter(remote.guid)
+        settled, unfinished = remote.handshake, remote.unfinished
+        if unfinished is not None:
+            if self._room.spoke(remote.guid):
+                remote.said = message
+            else:
+                self._act(remote, unfinished, unfinished.receive(message, now), now)
+        if unfinished is not settled and not settled.is_begun_anew_by(message):
+            self._act(remote, settled, settled.receive(message, now), now)
+        self._call_next(now)
+
+    def too_large(self, remote: RemoteParticipant, octets: int) -> None:
+        """A message of the stateless topic, which was not read."""
+        self._report(
+            remote,
+            f"a handshake message has {octets} octets, more than {MAX_HANDSHAKE_OCTETS}: is a document so large?",
+        )
+
+    def _call_next(self, now: float) -> None:
+        """Whoever waits takes the seats that are free, and those of others whose turn is over."""
+        for _ in range(self._room.waiting_count):
+            rested = self._room.end_turn(now)
+            if rested is not None and (unfinished := self._remotes[rested.prefix].unfinished) is not None:
+                unfinished.pause()
+            called = self._room.seat_next(now)
+            if called is None:
+                return
+            remote = self._remotes[called.prefix]
+            if (unfinished := remote.unfinished) is None:
+                self._room.leave(called)
+                continue
+            said, remote.said = remote.said, None
+            self._act(remote, unfinished, unfinished.resume(now), now)
+            if said is not None and unfinished is remote.unfinished:
+                self._act(remote, unfinished, unfinished.receive(said, now), now)
 
     @staticmethod
     def _has_forgotten_us(remote: RemoteParticipant, now: float) -> bool:
@@ -191,17 +228,27 @@ class AdmissionDesk:
         _, proceed = self._jobs.pop(effect.generation, (None, None))
         if proceed is not None:
             proceed(result, now)
+        self._call_next(now)
 
     def handle_timeout(self, now: float) -> None:
-        while self.next_deadline() <= now:
+        while self._next_timer() <= now:
             _, _, remote = heapq.heappop(self._timers)
             remote.due = math.inf
             for handshake in (remote.handshake, remote.renewal):
-                if handshake is not None and handshake.next_deadline() <= now:
+                if handshake is None or handshake.next_deadline() > now:
+                    continue
+                if handshake.state is State.FAILED:  # it may try again, when it has its turn
+                    handshake.pause()
+                    self._room.enter(remote.guid)
+                else:
                     self._act(remote, handshake, handshake.handle_timeout(now), now)
             self._arm(remote)
+        self._call_next(now)
 
     def next_deadline(self) -> float:
+        return min(self._next_timer(), self._room.next_deadline())
+
+    def _next_timer(self) -> float:
         """Of all handshakes.  A crowd of strangers makes many, so nothing here takes longer the more there are."""
         timers = self._timers
         while timers:
@@ -237,6 +284,8 @@ class AdmissionDesk:
                     remote.renewal = None
                 case Failed(reason, _):
                     self._failed(remote, reason)
+        if remote.unfinished is None or remote.unfinished.state is State.FAILED:
+            self._room.leave(remote.guid)
         self._arm(remote)
 
     def _worked(self, remote: RemoteParticipant, handshake: Handshake, result: object, now: float) -> None:
@@ -378,7 +427,8 @@ class AdmissionDesk:
         for handshake in (remote.handshake, remote.renewal):
             if handshake is not None:
                 handshake.close()
-        remote.handshake = remote.renewal = None
+        remote.handshake = remote.renewal = remote.said = None
+        self._room.leave(remote.guid)
 
     def _return_credentials(self, remote: RemoteParticipant) -> None:
         """What the plugins gave us when it authenticated."""

@@ -12,6 +12,7 @@ the messages loses, repeats and reorders them, and anybody can write to it.  Fro
 * another request while the final is awaited is answered too, beside the first: requests are not signed, so neither
   of the two can be said to be the true one before its final comes (:data:`MAX_REPLIES`); and both may be;
 * after :data:`LIMIT_S` it is given up and begun anew, later each time;
+* one that is paused, as others have their turn (:mod:`.waiting_room`), says nothing unasked and keeps what it reached;
 * one that is done answers repeats and nothing else.  Who has lost his state begins another, beside the first, which
   takes its place when it is done as well (:meth:`Handshake.is_begun_anew_by`).
 
@@ -239,6 +240,7 @@ class Handshake:
         self._resend_s = RESEND_FIRST_S
         self._finals = 0
         self._is_confirmed = False
+        self._is_begun = self._is_paused = False
         self._retry_s = RETRY_FIRST_S
         self._deaf_until = -math.inf
         self._deaf_s = _DEAF_FIRST_S
@@ -255,6 +257,7 @@ class Handshake:
 
     def begin(self, now: float) -> list[Output]:
         """The participant was discovered."""
+        self._is_begun = True
         self._limit = now + LIMIT_S
         self._begin(now)
         return self._drain()
@@ -302,6 +305,34 @@ class Handshake:
             self._due = math.inf
             self._step(Event.TIMEOUT, now)
         return self._drain()
+
+    def pause(self) -> None:
+        """Say nothing unasked until :meth:`resume`.  Time goes on: the limit of the attempt stays where it is.
+
+        Of several replies that wait for their final the latest is kept: who waits should cost little.
+        """
+        self._is_paused = True
+        self._due = math.inf
+        if self.state is State.AWAIT_FINAL:
+            for exchange in self._exchanges[:-1]:
+                self._authentication.return_handshake_handle(exchange.handle)
+            del self._exchanges[:-1]
+
+    def resume(self, now: float) -> list[Output]:
+        """Begin, begin anew, or say again what was said last."""
+        self._is_paused = False
+        if not self._is_begun:
+            return self.begin(now)
+        if (self.state, Event.TIMEOUT) not in TRANSITIONS:
+            return []
+        self._resend_s = RESEND_FIRST_S / 2
+        self._due = now
+        return self.handle_timeout(now)
+
+    @property
+    def is_done(self) -> bool:
+        """Authenticated; what comes now are repeats, and finals to other replies of ours."""
+        return self.state in (State.AUTHENTICATED, State.VERIFYING_ANOTHER)
 
     def next_deadline(self) -> float:
         if (self.state, Event.LIMIT) in TRANSITIONS:
@@ -468,6 +499,8 @@ class Handshake:
             self._set_resend(now)
 
     def _set_resend(self, now: float) -> None:
+        if self._is_paused and not self.is_done:
+            return
         self._due = now + self._resend_s * (1 + 0.25 * self._jitter())
 
     def _event_of(self, token: DataHolder) -> Event | None:

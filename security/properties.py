@@ -20,6 +20,7 @@ __all__ = [
     "BUILTIN_ENDPOINT_NAME",
     "CRYPTO_PLUGIN",
     "GOVERNANCE",
+    "HANDSHAKE_LIMIT",
     "IDENTITY_CA",
     "IDENTITY_CERTIFICATE",
     "IDENTITY_CRL",
@@ -43,6 +44,7 @@ PRIVATE_KEY: Final = "dds.sec.auth.private_key"
 PASSWORD: Final = "dds.sec.auth.password"
 IDENTITY_CRL: Final = "dds.sec.auth.crl"
 TRUSTED_CA_DIR: Final = "dds.sec.auth.trusted_ca_dir"
+HANDSHAKE_LIMIT: Final = "dds.sec.auth.max_handshakes"
 PERMISSIONS_CA: Final = "dds.sec.access.permissions_ca"
 GOVERNANCE: Final = "dds.sec.access.governance"
 PERMISSIONS: Final = "dds.sec.access.permissions"
@@ -62,7 +64,7 @@ BUILTIN_ENDPOINT_NAME: Final = "dds.sec.builtin_endpoint_name"
 """Given by the service with each builtin endpoint that it registers; never by a user (§8.8.8.1)."""
 
 _NAMES: Final = (
-    *(IDENTITY_CA, IDENTITY_CERTIFICATE, PRIVATE_KEY, PASSWORD, IDENTITY_CRL, TRUSTED_CA_DIR),
+    *(IDENTITY_CA, IDENTITY_CERTIFICATE, PRIVATE_KEY, PASSWORD, IDENTITY_CRL, TRUSTED_CA_DIR, HANDSHAKE_LIMIT),
     *(PERMISSIONS_CA, GOVERNANCE, PERMISSIONS),
     *(KEY_SIZE, MAX_BLOCKS_PER_SESSION),
     *(LOG_LEVEL, LOG_FILE, LOG_DISTRIBUTE),

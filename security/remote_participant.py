@@ -32,6 +32,8 @@ class RemoteParticipant:
     ``renewal``: another handshake, that will take the first one's place, as the peer has lost what it knew of us.  Who
     says so in its name cannot prove it: ``renewal_asked`` is when that was said first, and what ``opened`` was then.
 
+    ``said``: the last handshake message of one that waits for its turn.
+
     ``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first.
     """
 
@@ -41,6 +43,7 @@ class RemoteParticipant:
     handshake: Handshake | None = None
     renewal: Handshake | None = None
     renewal_asked: tuple[float, int] | None = None
+    said: GenericMessage | None = None
     permissions: PermissionsHandle | None = None
     shared_secret: SharedSecretHandle | None = None
     crypto: ParticipantCryptoHandle | None = None
@@ -52,3 +55,11 @@ class RemoteParticipant:
     @property
     def guid(self) -> Guid:
         return self.data.guid
+
+    @property
+    def unfinished(self) -> Handshake | None:
+        """The handshake that still has to be done, of the two that there may be."""
+        for handshake in (self.renewal, self.handshake):
+            if handshake is not None and not handshake.is_done:
+                return handshake
+        return None

@@ -32,13 +32,14 @@ from ddsi.spi import (
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.cache_change import CacheChange
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.guid import Guid, GuidPrefix
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import DataRepresentationId, KeepLast, Properties, Reliable, TransientLocal
 from ddsi.structure.security_information import EndpointSecurity, ParticipantSecurity
 from ddsi.xtypes import serialize
 
-from .admission import AdmissionDesk
+from .admission import MAX_HANDSHAKE_OCTETS, AdmissionDesk
 from .announced import endpoint_info, endpoint_refusal, info
 from .builtin_logging_type import LOG_TOPIC_NAME, LOG_TYPE_NAME, BuiltinLoggingTypeV2
 from .handshake import State
@@ -48,9 +49,11 @@ from .local_endpoint import SECURE_BUILTIN, LocalEndpoint
 from .logging_plugin import LogLevel
 from .mailbox import Mailbox
 from .own_participant import OwnParticipant
+from .properties import HANDSHAKE_LIMIT, security_properties
 from .protection import Protection
 from .remote_participant import RemoteParticipant, Standing
 from .security_information import SecurityInformation
+from .waiting_room import MAX_HANDSHAKES
 
 __all__ = ["SecurityService", "load"]
 
@@ -64,8 +67,16 @@ _WALL_CLOCK_CHECK_S: Final = 300.0
 class SecurityService:
     """Implements :class:`ddsi.spi.SecurityHooks` for one participant."""
 
-    def __init__(self, plugins: Plugins, *, entropy: Callable[[int], bytes], wall_clock: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        plugins: Plugins,
+        *,
+        entropy: Callable[[int], bytes],
+        wall_clock: Callable[[], int],
+        max_handshakes: int = MAX_HANDSHAKES,
+    ) -> None:
         self._plugins = plugins
+        self._max_handshakes = max_handshakes
         self._entropy = entropy
         self._wall_clock = wall_clock
         self._now = 0.0
@@ -95,6 +106,7 @@ class SecurityService:
         )
         self._desk = AdmissionDesk(
             plugins, own, self._remotes, self._keys, self._mailbox, self._effects,
+            max_handshakes=self._max_handshakes,
             jitter=lambda: int.from_bytes(self._entropy(4), "big") / 0xFFFFFFFF,
             changed=self._changed,
         )  # fmt: skip
@@ -153,7 +165,7 @@ class SecurityService:
         return admission
 
     def remote_participant_lost(self, guid: Guid) -> None:
-        self._desk.lost(guid)
+        self._desk.lost(guid, self._now)
         self._rearm()
 
     def admits_announcement(self, data: DiscoveredWriterData | DiscoveredReaderData, *, is_secure: bool) -> bool:
@@ -224,10 +236,16 @@ class SecurityService:
     def receive_message(self, change: CacheChange, now: float) -> None:
         self._now = now
         remote = self._remotes.get(change.writer_guid.prefix)
-        message = self._mailbox.open(change) if remote is not None else None
-        if remote is None or message is None:
+        if remote is None:
             return
-        if change.writer_guid.entity_id == ids.PARTICIPANT_STATELESS_MESSAGE_WRITER:
+        is_handshake = change.writer_guid.entity_id == ids.PARTICIPANT_STATELESS_MESSAGE_WRITER
+        if is_handshake and len(change.payload) > MAX_HANDSHAKE_OCTETS:
+            self._desk.too_large(remote, len(change.payload))
+            return
+        message = self._mailbox.open(change)
+        if message is None:
+            return
+        if is_handshake:
             self._desk.receive(remote, message, now)
         elif remote.standing is Standing.ADMITTED:
             self._desk.confirmed(remote)
@@ -307,6 +325,14 @@ def _protected_refusal(endpoint: LocalEndpoint, remote: DiscoveredWriterData | D
     return None
 
 
+def _max_handshakes(properties: Properties) -> int:
+    """How many handshakes go on at once.  Raises ConfigurationError."""
+    value = security_properties(properties).get(HANDSHAKE_LIMIT, str(MAX_HANDSHAKES))
+    if not (value.isascii() and value.isdecimal() and 0 < len(value) < 7 and int(value)):
+        raise ConfigurationError(f"property {HANDSHAKE_LIMIT} is {value!r}: give a whole number from 1 to 999999")
+    return int(value)
+
+
 class _Factory:
     """Makes the SecurityHooks of one participant from its properties.  Implements ``ddsi.spi.loader.HooksFactory``."""
 
@@ -317,7 +343,9 @@ class _Factory:
         self, properties: Properties, *, entropy: Callable[[int], bytes], wall_clock: Callable[[], int]
     ) -> SecurityService:
         plugins = load_plugins(properties, entropy=entropy, wall_clock=wall_clock)
-        return SecurityService(plugins, entropy=entropy, wall_clock=wall_clock)
+        return SecurityService(
+            plugins, entropy=entropy, wall_clock=wall_clock, max_handshakes=_max_handshakes(properties)
+        )
 
 
 load = _Factory()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from random import Random
 
@@ -35,10 +35,18 @@ def properties_of(identity: str, governance: str = "governance") -> dict[str, st
 class Side:
     """One participant: its hooks, what it announces, what was decided, and its messages that are under way."""
 
-    def __init__(self, identity: str, governance: str = "governance", *, seed: int = 0, keys_seed: int = 0) -> None:
-        """``seed`` decides the Guid; ``keys_seed`` what is drawn after it."""
+    def __init__(
+        self,
+        identity: str,
+        governance: str = "governance",
+        *,
+        seed: int = 0,
+        keys_seed: int = 0,
+        extra: Mapping[str, str] | None = None,
+    ) -> None:
+        """``seed`` decides the Guid; ``keys_seed`` what is drawn after it; ``extra`` are further properties."""
         self.clock_ns = NOW_NS
-        properties = properties_of(identity, governance)
+        properties = {**properties_of(identity, governance), **(extra or {})}
         entropy: Callable[[int], bytes] = Random(f"{identity}{seed} {keys_seed}").randbytes
         self.hooks: SecurityService = load(properties, entropy=entropy, wall_clock=lambda: self.clock_ns)
         candidate = Guid(Random(f"{identity}{seed}").randbytes(12) + EntityId.PARTICIPANT)

@@ -426,3 +426,56 @@ def test_every_state_can_be_left_and_reached() -> None:
     assert {state for _, state in TRANSITIONS.values()} == set(State)
     assert {event for _, event in TRANSITIONS} == set(Event)
     assert {action for action, _ in TRANSITIONS.values()} == set(Action)
+
+
+# --- others have their turn -----------------------------------------------------------------------------------------
+
+
+def test_one_that_is_paused_says_nothing_unasked_and_still_answers() -> None:
+    low, high = pair()
+    low.wait()
+    low.machine.pause()
+    high.receive(low.sent[-1], 0.01)
+    count = len(low.sent)
+    low.do(low.machine.handle_timeout(50.0), 50.0)
+    assert len(low.sent) == count
+    low.receive(high.sent[-1], 51.0)
+    assert low.is_authenticated
+    assert low.machine.next_deadline() < 52.0, "its final is said again, until the peer confirms"
+
+
+def test_one_that_resumes_says_again_what_it_said_last() -> None:
+    low, _ = pair()
+    low.wait()
+    low.machine.pause()
+    count = len(low.sent)
+    low.do(low.machine.resume(30.0), 30.0)
+    assert len(low.sent) == count + 1
+    assert low.sent[-1].message_data == low.sent[-2].message_data
+    assert 30.1 <= low.machine.next_deadline() <= 30.2
+
+
+def test_a_pause_does_not_lengthen_the_attempt() -> None:
+    _, high = pair()
+    high.machine.pause()
+    assert high.machine.next_deadline() == LIMIT_S
+    assert high.wait() == LIMIT_S
+    assert isinstance(high.told[-1], Failed)
+
+
+def test_one_that_never_had_its_turn_begins_with_it() -> None:
+    low = Side(LOW)
+    low.do(low.machine.resume(5.0), 5.0)
+    assert low.machine.state is State.GREETING
+
+
+def test_while_it_is_paused_only_the_latest_reply_waits_for_its_final() -> None:
+    low, high = awaiting_final()
+    high.receive(token("Req", "forged"), 0.5)
+    high.machine.pause()
+    assert [exchange.is_returned for exchange in high.plugin.exchanges] == [True, False]
+    high.do(high.machine.resume(2.0), 2.0)
+    high.receive(low.sent[-1], 3.0)
+    low.receive(high.sent[-1], 3.1)
+    high.receive(low.sent[-1], 3.2)
+    assert high.is_authenticated
