@@ -11,7 +11,18 @@ from typing import Any
 
 from ..structure.errors import BadParameter
 
-__all__ = ["Array", "Bound", "ElementOf", "Flag", "HashId", "MemberId", "autoid_hash"]
+__all__ = [
+    "Array",
+    "Bits",
+    "Bound",
+    "CaseLabels",
+    "ElementOf",
+    "Flag",
+    "HashId",
+    "MemberId",
+    "MemberName",
+    "autoid_hash",
+]
 
 LARGEST_MEMBER_ID = 0x0FFFFFFF
 
@@ -83,6 +94,44 @@ class HashId:
         if not isinstance(name, str):
             raise BadParameter(f"idl.hashid takes a name, not {name!r}")
         return HashId(name)
+
+
+@dataclass(frozen=True, slots=True)
+class MemberName:
+    """``idl.name("from")``: the member's name in IDL, where Python cannot have it."""
+
+    name: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise BadParameter(f"idl.name takes the member's name in IDL, not {self.name!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Bits:
+    """``idl.bits(width)``: a field of a bitset, which begins at bit ``at``, or behind the field before it."""
+
+    width: int
+    at: int | None = None
+
+    def __post_init__(self) -> None:
+        at = 0 if self.at is None else self.at
+        for number in (self.width, at):
+            if isinstance(number, bool) or not isinstance(number, int):
+                raise BadParameter(f"idl.bits takes numbers of bits, not {number!r}")
+        if self.width < 1 or at < 0 or at + self.width > 64:
+            raise BadParameter(f"idl.bits({self.width}) at bit {at}: a bitset has bits 0 to 63")
+
+
+@dataclass(frozen=True, slots=True)
+class CaseLabels:
+    """``idl.case(1, 2)``: the discriminators that select a member of a union; ``is_default``: those of no other case.
+
+    The value of the member in the class; without any labels it marks the discriminator (``idl.switch``).
+    """
+
+    labels: tuple[Any, ...] = ()
+    is_default: bool = False
 
 
 def autoid_hash(name: str) -> int:

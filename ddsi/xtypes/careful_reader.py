@@ -17,6 +17,8 @@ from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from ..structure.errors import MalformedSample
+from .bitsets import bitset_from
+from .buffers import wchars_from
 from .defaults import default_cost, default_value, elements_value, zero_cost
 from .enumerations import bitmask_from
 from .layout import Encoding, encapsulations, first_alignment, has_dheader
@@ -26,14 +28,18 @@ from .model import (
     WCHAR,
     ArrayType,
     BitmaskType,
+    BitsetType,
+    Composite,
     EnumType,
     Extensibility,
     IdlType,
+    MapType,
     Member,
     Primitive,
     SequenceType,
     String,
     StructType,
+    UnionType,
 )
 
 __all__ = ["read_carefully"]
@@ -148,14 +154,22 @@ class _CarefulReader:
                 return self._primitive(type_, self._number(type_.code, type_.size))
             case EnumType():
                 return self._literal(type_, self._number(type_.code, type_.size))
+            case BitsetType():
+                return bitset_from(type_, self._number(type_.code, type_.size))
             case BitmaskType():
                 return bitmask_from(type_.python_class, self._number(type_.code, type_.size))
+            case String(wide=True):
+                return self._wide_string(type_)
             case String():
                 return self._string(type_)
             case SequenceType() | ArrayType():
                 return self._collection(type_)
+            case MapType():
+                return self._map(type_)
             case StructType():
                 return self._struct(type_, growable=growable)
+            case UnionType():
+                return self._union(type_)
 
     def _primitive(self, type_: Primitive, raw: Any) -> Any:
         if type_ == BOOLEAN:
@@ -183,6 +197,39 @@ class _CarefulReader:
             return octets[:-1].decode()
         except UnicodeDecodeError as error:
             self.fail(f"a string is not UTF-8 ({error.reason})")
+
+    def _wide_string(self, type_: String) -> str:
+        """The length counts octets.  (Fast CDR counts units of two octets, which cannot be told apart.)"""
+        length = self._uint32()
+        if length & 1:
+            self.fail(f"a wide string of {length} octets, which is no number of units of two")
+        if type_.bound is not None and length > 2 * type_.bound:
+            self.fail(f"a wide string of {length // 2} characters exceeds its bound of {type_.bound}")
+        return wchars_from(self._take(length), little_endian=self._encoding.little_endian)
+
+    def _map(self, type_: MapType) -> dict[Any, Any]:
+        if not has_dheader(type_, self._encoding):
+            return self._entries(type_)
+        with self._delimited(self._uint32()):
+            value = self._entries(type_)
+            if self._end - self._position > 3:
+                self.fail(f"{self._end - self._position} octets too many after the entries")
+        return value
+
+    def _entries(self, type_: MapType) -> dict[Any, Any]:
+        count = self._uint32()
+        if type_.bound is not None and count > type_.bound:
+            self.fail(f"{count} entries exceed the bound of {type_.bound}")
+        if 2 * count > self._end - self._position:  # a key and a value have an octet each at least
+            self.fail(f"{count} entries of {type_} where {max(0, self._end - self._position)} octets are left")
+        entries: dict[Any, Any] = {}
+        for index in range(count):
+            with self._at(f"[{index}]"):
+                key = self._value(type_.key)
+                if key in entries:
+                    self.fail(f"the key {key!r} is there twice")
+                entries[key] = self._value(type_.value)
+        return entries
 
     def _collection(self, type_: SequenceType | ArrayType) -> Any:
         if not has_dheader(type_, self._encoding):
@@ -245,23 +292,61 @@ class _CarefulReader:
         growable = growable and type_.extensibility is Extensibility.APPENDABLE
         values = {}
         for member in type_.members:
-            if growable and self._is_at_end(member.type):
+            if growable and self._is_at_end(member):
                 break
             with self._at(f".{member.name}"):
                 values[member.name] = self._plain_member(member)
         return values
 
-    def _is_at_end(self, type_: IdlType) -> bool:
-        """Nothing is left where a member of this type would begin.
+    def _union(self, type_: UnionType) -> Any:
+        self._depth += 1
+        if self._depth > _MOST_DEPTH:
+            self.fail("structs are nested too deep")
+        if has_dheader(type_, self._encoding):
+            with self._delimited(self._uint32()):
+                value = self._union_value(type_)
+        else:
+            value = self._union_value(type_)
+        self._depth -= 1
+        return value
 
-        Alignment counts: in XCDR1 up to 3 octets may be padding of which no header told.
+    def _union_value(self, type_: UnionType) -> Any:
+        """A discriminator without its member is refused: nothing says what the member would be."""
+        name = type_.discriminator.name
+        values: dict[str, Any] = {}
+        if type_.extensibility is Extensibility.MUTABLE:
+            values = self._emheader_members(type_) if self._encoding.is_xcdr2 else self._parameter_list(type_)
+            if name not in values:
+                self.fail("a union without its discriminator")
+        else:
+            with self._at(f".{name}"):
+                values[name] = self._value(type_.discriminator.type)
+        case = type_.case_of(values[name])
+        if case is not None and case.name not in values:
+            if type_.extensibility is Extensibility.MUTABLE:
+                self.fail(f"a union without the member {case.name}, which its discriminator selects")
+            with self._at(f".{case.name}"):
+                values[case.name] = self._value(case.type)
+        union = object.__new__(type_.python_class)
+        union._idl_discriminator = values[name]
+        union._idl_value = None if case is None else values[case.name]
+        return union
+
+    def _is_at_end(self, member: Member) -> bool:
+        """Nothing is left where the member would begin.
+
+        Alignment counts: in XCDR1 up to 3 octets may be padding of which no header told.  An optional member begins
+        with a flag of one octet, or in XCDR1 with a header.
         """
-        alignment = self._encoding.alignment(first_alignment(type_))
+        if member.is_optional:
+            alignment = 1 if self._encoding.is_xcdr2 else 4
+        else:
+            alignment = self._encoding.alignment(first_alignment(member.type))
         return self._position + -(self._position - self._origin) % alignment >= self._end
 
     def _construct(self, type_: StructType, values: dict[str, Any]) -> Any:
         value = object.__new__(type_.python_class)
-        for member in (*type_.members, *type_.omitted):
+        for member in type_.declared:
             setattr(value, member.name, values[member.name] if member.name in values else self._default(member))
         if hasattr(value, "__post_init__"):
             try:
@@ -292,7 +377,7 @@ class _CarefulReader:
 
     # --- mutable types -----------------------------------------------------------------------------------
 
-    def _parameter_list(self, type_: StructType) -> dict[str, Any]:
+    def _parameter_list(self, type_: Composite) -> dict[str, Any]:
         """XCDR1: parameters up to PID_LIST_END (§7.4.1.2)."""
         members = {member.id: member for member in type_.members}
         values: dict[str, Any] = {}
@@ -318,7 +403,7 @@ class _CarefulReader:
             return -identifier, False, length if identifier == PID_IGNORE else 0
         return identifier, must_understand, length
 
-    def _emheader_members(self, type_: StructType) -> dict[str, Any]:
+    def _emheader_members(self, type_: Composite) -> dict[str, Any]:
         """XCDR2: members with EMHEADER up to the end that the delimiter gave (§7.4.3.4.2)."""
         members = {member.id: member for member in type_.members}
         values: dict[str, Any] = {}

@@ -13,16 +13,19 @@ from .buffers import nest
 from .model import (
     ArrayType,
     BitmaskType,
+    BitsetType,
     EnumType,
     IdlType,
+    MapType,
     Member,
     Primitive,
     SequenceType,
     String,
     StructType,
+    UnionType,
 )
 
-__all__ = ["default_cost", "default_value", "elements_value", "zero_cost", "zero_value"]
+__all__ = ["default_cost", "default_value", "elements_value", "union_zero", "zero_cost", "zero_value"]
 
 
 def default_value(member: Member) -> Any:
@@ -43,6 +46,12 @@ def zero_value(type_: IdlType) -> Any:
             return type_.default
         case BitmaskType():
             return type_.python_class(0)
+        case BitsetType():
+            return type_.python_class()
+        case MapType():
+            return {}
+        case UnionType():
+            return union_zero(type_)
         case SequenceType():
             return elements_value(type_, [])
         case ArrayType():
@@ -50,9 +59,18 @@ def zero_value(type_: IdlType) -> Any:
             return elements_value(type_, elements)
         case StructType():
             value = object.__new__(type_.python_class)
-            for member in (*type_.members, *type_.omitted):
+            for member in type_.declared:
                 setattr(value, member.name, default_value(member))
             return value
+
+
+def union_zero(type_: UnionType) -> Any:
+    """The discriminator's default, and the default of the member that it selects."""
+    value = object.__new__(type_.python_class)
+    value._idl_discriminator = default_value(type_.discriminator)
+    case = type_.case_of(value._idl_discriminator)
+    value._idl_value = None if case is None else default_value(case)
+    return value
 
 
 def default_cost(member: Member) -> int:
@@ -67,8 +85,11 @@ def zero_cost(type_: IdlType) -> int:
             return 1 + type_.count * zero_cost(type_.element)
         case StructType():
             if type_.zero_cost is None:
-                type_.zero_cost = 1 + sum(default_cost(member) for member in (*type_.members, *type_.omitted))
+                type_.zero_cost = 1 + sum(default_cost(member) for member in type_.declared)
             return type_.zero_cost
+        case UnionType():
+            case = type_.case_of(default_value(type_.discriminator))
+            return 1 if case is None else 1 + default_cost(case)
         case _:
             return 1
 

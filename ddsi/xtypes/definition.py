@@ -22,7 +22,7 @@ from .model import Extensibility, Member, StructType
 from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver
 from .value_check import check_value
 
-__all__ = ["define_struct", "struct_type"]
+__all__ = ["define_struct", "own_annotations", "struct_type"]
 
 
 def struct_type(python_class: Any) -> StructType:
@@ -39,6 +39,7 @@ def define_struct(
     type_name: str | None,
     extensibility: Extensibility,
     autoid: str,
+    is_nested: bool,
     frame: FrameType,
 ) -> type[Any]:
     """The decorated class; see :func:`ddsi.idl.struct`."""
@@ -54,7 +55,7 @@ def define_struct(
     base = _base_of(python_class)
     decorated = _slotted(python_class)
     search = _MemberSearch(decorated, base, hashed=autoid == "hash", frame=frame)
-    struct = StructType(decorated, type_name or name, extensibility, search.members, base=base)
+    struct = StructType(decorated, type_name or name, extensibility, search.members, base=base, is_nested=is_nested)
     setattr(decorated, STRUCT_ATTRIBUTE, struct)
     with contextlib.suppress(NameError):  # a name not defined yet: found, or refused, at first use
         _ = struct.members
@@ -96,8 +97,8 @@ class _MemberSearch:
         self._frame: FrameType | None = frame
 
     def members(self) -> tuple[Member, ...]:
-        inherited = self._base.members if self._base is not None else ()
-        annotations = _own_annotations(self._class)
+        inherited = self._base.declared if self._base is not None else ()
+        annotations = own_annotations(self._class)
         _refuse_init_variables(self._class, annotations)
         resolver = self._resolver()
         members = list(inherited)
@@ -107,7 +108,7 @@ class _MemberSearch:
             if any(field.name == member.name for member in inherited):
                 raise self._refusal(field.name, "its base has a member of that name")
             members.append(self._member(field, annotations[field.name], resolver, members))
-        if not members:
+        if not any(member.is_serialized for member in members):
             raise BadParameter(f"{self._class.__name__}: a struct has one member at least")
         self._frame = None  # not needed any more, and it would keep the function's locals alive
         return tuple(members)
@@ -130,12 +131,15 @@ class _MemberSearch:
             raise self._refusal(field.name, f"its annotation cannot be read: {error}") from error
         member = Member(
             field.name,
-            self._member_id(field.name, resolved, before),
+            self._member_id(resolved.idl_name or field.name, resolved, before),
             resolved.type,
             is_key="key" in resolved.flags,
             is_optional="optional" in resolved.flags,
             must_understand="must_understand" in resolved.flags,
             default=_default_of(field),
+            idl_name=resolved.idl_name,
+            is_external="external" in resolved.flags,
+            is_serialized="non_serialized" not in resolved.flags,
         )
         self._check(member, before)
         return member
@@ -152,6 +156,8 @@ class _MemberSearch:
     def _check(self, member: Member, before: list[Member]) -> None:
         if member.is_key and member.is_optional:
             raise self._refusal(member.name, "a key member cannot be optional")
+        if member.is_key and not member.is_serialized:
+            raise self._refusal(member.name, "a key member must travel")
         if member.is_key and self._base is not None and any(inherited.is_key for inherited in self._base.members):
             raise self._refusal(
                 member.name, f"the key is that of the base {self._base.type_name}; no member adds to it"
@@ -171,7 +177,7 @@ class _MemberSearch:
         return BadParameter(f"{self._class.__name__}.{member}: {reason}")
 
 
-def _own_annotations(python_class: type[Any]) -> Mapping[str, Any]:
+def own_annotations(python_class: type[Any]) -> Mapping[str, Any]:
     if sys.version_info >= (3, 14):
         import annotationlib
 

@@ -7,8 +7,9 @@
         points: idl.sequence[idl.float64] = ()
 
 OMG IDL 4.2 §7.4 and DDS-XTypes 1.3 §7.3.  To a type checker ``idl.int32`` is ``int``, ``idl.float64`` is ``float``
-and ``idl.sequence[T]`` is ``Sequence[T]``, which for octets ``bytes`` fulfils as well.  Not yet: unions, maps, wide
-strings, loading of IDL text.
+and ``idl.sequence[T]`` is ``Sequence[T]``, which for octets ``bytes`` fulfils as well.
+
+``load`` and ``loads`` make such classes from IDL text, ``to_idl`` makes IDL text from them.
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ from dataclasses import Field, field
 from enum import IntEnum, IntFlag
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
 
+from ..structure.errors import BadParameter
 from . import model
-from .annotations import Array, Bound, ElementOf, Flag, HashId, MemberId
+from .annotations import Array, Bits, Bound, CaseLabels, ElementOf, Flag, HashId, MemberId, MemberName
+from .bitsets import define_bitset
 from .definition import define_struct
 from .enumerations import describe_bitmask, describe_enum
 from .model import Extensibility
+from .unions import define_union, selected_member
 
 __all__ = [
     "APPENDABLE",
@@ -33,8 +37,11 @@ __all__ = [
     "array",
     "array_of",
     "bitmask",
+    "bits",
+    "bitset",
     "boolean",
     "bound",
+    "case",
     "char",
     "enum",
     "external",
@@ -47,20 +54,28 @@ __all__ = [
     "int32",
     "int64",
     "key",
+    "map",
     "must_understand",
+    "name",
+    "non_serialized",
     "octet",
     "optional",
+    "selected_member",
     "sequence",
     "sequence_of",
     "struct",
+    "switch",
     "uint8",
     "uint16",
     "uint32",
     "uint64",
+    "union",
     "wchar",
+    "wstring",
 ]
 
 _T = TypeVar("_T")
+_K = TypeVar("_K")
 _C = TypeVar("_C")
 _E = TypeVar("_E", bound=IntEnum)
 _F = TypeVar("_F", bound=IntFlag)
@@ -88,6 +103,13 @@ sequence: TypeAlias = Sequence[_T]
 """``idl.sequence[T]``, for any T.  Takes lists, tuples and, for numbers, any buffer.  Comes back as ``bytes`` for
 octet and uint8, ``array.array`` for other numbers, ``str`` for characters, a list for the rest."""
 
+map: TypeAlias = dict[_K, _T]
+"""``idl.map[K, V]``, a dict.  Keys are numbers, strings, characters, booleans, enums; ``idl.bound`` limits entries."""
+
+wstring: TypeAlias = Annotated[str, model.String(wide=True)]
+"""A string that travels as UTF-16; ``idl.bound`` counts its units.  Vendors disagree on its length on the wire (here:
+in octets, as in Cyclone DDS and OpenDDS); ``str`` is the interoperable choice."""
+
 key = Flag("key")
 """The member is part of the key (IDL ``@key``)."""
 
@@ -99,6 +121,9 @@ must_understand = Flag("must_understand")
 
 external = Flag("external")
 """IDL ``@external``: it changes neither the Python value nor the encoding."""
+
+non_serialized = Flag("non_serialized")
+"""The member does not travel (IDL ``@non_serialized``); a received sample has its default."""
 
 hashid = HashId()
 """The member id is the hash of the member's name, or of a given one: ``idl.hashid("name")``."""
@@ -121,6 +146,30 @@ def array(*dimensions: int) -> Array:
 def id(number: int) -> MemberId:
     """The member id, 0 to 0x0fffffff (IDL ``@id``)."""
     return MemberId(number)
+
+
+def name(idl_name: str) -> MemberName:
+    """The member's name in IDL, where Python keeps the word for itself: ``from_: Annotated[str, idl.name("from")]``."""
+    return MemberName(idl_name)
+
+
+def bits(width: int, *, at: int | None = None) -> Bits:
+    """A field of an ``idl.bitset``: how many bits, and the lowest of them (default: behind the field before)."""
+    return Bits(width, at)
+
+
+switch: Any = CaseLabels()
+"""Marks the discriminator of a union: ``discriminator: idl.int32 = idl.switch``."""
+
+
+def case(*labels: Any, default: bool = False) -> Any:
+    """Marks a member of a union: ``a: idl.int32 = idl.case(1, 2)``, or ``idl.case(default=True)``.
+
+    ``labels`` are the discriminators that select it; ``default``: those that no other case has.
+    """
+    if not labels and not default:
+        raise BadParameter("idl.case takes the labels that select the member, or default=True")
+    return CaseLabels(labels, default)
 
 
 def sequence_of(element: Any) -> ElementOf:
@@ -148,6 +197,7 @@ def struct(
     typename: str | None = None,
     extensibility: Extensibility = Extensibility.APPENDABLE,
     autoid: Literal["sequential", "hash"] = "sequential",
+    nested: bool = False,
 ) -> Callable[[type[_C]], type[_C]]: ...
 @dataclass_transform(field_specifiers=(field, Field))
 def struct(
@@ -157,12 +207,14 @@ def struct(
     typename: str | None = None,
     extensibility: Extensibility = Extensibility.APPENDABLE,
     autoid: Literal["sequential", "hash"] = "sequential",
+    nested: bool = False,
 ) -> Any:
     """Make a class an IDL struct: a dataclass with slots whose annotations say the IDL types.
 
     ``typename`` is the name on the wire (``module::Name``; default: the class's name); ``extensibility`` is
     ``idl.FINAL``, ``idl.APPENDABLE`` (the default, as in IDL 4.2) or ``idl.MUTABLE``; ``autoid`` tells how members
-    without ``idl.id`` get their ids.  A base class that is a struct is the IDL base.
+    without ``idl.id`` get their ids; ``nested`` says that it is no topic type itself (IDL ``@nested``; other programs
+    are told, nothing else changes).  A base class that is a struct is the IDL base.
 
     Raises BadParameter, naming member and reason, for a class that cannot be a type; where an annotation names
     what is not yet defined, at first use.
@@ -170,9 +222,77 @@ def struct(
     frame = sys._getframe(1)  # where local classes are found, which the module does not know
 
     def decorate(undecorated: type[Any]) -> type[Any]:
-        return define_struct(undecorated, type_name=typename, extensibility=extensibility, autoid=autoid, frame=frame)
+        return define_struct(
+            undecorated,
+            type_name=typename,
+            extensibility=extensibility,
+            autoid=autoid,
+            is_nested=nested,
+            frame=frame,
+        )
 
     return decorate if python_class is None else decorate(python_class)
+
+
+@overload
+def union(python_class: type[_C], /) -> type[_C]: ...
+@overload
+def union(
+    *,
+    typename: str | None = None,
+    extensibility: Extensibility = Extensibility.APPENDABLE,
+    autoid: Literal["sequential", "hash"] = "sequential",
+    nested: bool = False,
+) -> Callable[[type[_C]], type[_C]]: ...
+@dataclass_transform(kw_only_default=True)
+def union(
+    python_class: type[Any] | None = None,
+    /,
+    *,
+    typename: str | None = None,
+    extensibility: Extensibility = Extensibility.APPENDABLE,
+    autoid: Literal["sequential", "hash"] = "sequential",
+    nested: bool = False,
+) -> Any:
+    """Make a class an IDL union: one member at a time, chosen by a discriminator.
+
+        @idl.union
+        class Measurement:
+            kind: idl.int32 = idl.switch
+            count: idl.int32 = idl.case(1, 2)
+            text: str = idl.case(default=True)
+
+    ``Measurement(count=5)`` has the first label as discriminator, ``Measurement(kind=2, count=5)`` the one given.
+    Reading the other member raises AttributeError; setting a member selects it.  Options are those of
+    :func:`struct`.  Raises BadParameter as that does.
+    """
+    frame = sys._getframe(1)
+
+    def decorate(undecorated: type[Any]) -> type[Any]:
+        return define_union(
+            undecorated,
+            type_name=typename,
+            extensibility=extensibility,
+            autoid=autoid,
+            is_nested=nested,
+            frame=frame,
+        )
+
+    return decorate if python_class is None else decorate(python_class)
+
+
+@dataclass_transform()
+def bitset(*, typename: str | None = None) -> Callable[[type[_C]], type[_C]]:
+    """Make a class an IDL bitset: fields of some bits each, ``Annotated[idl.uint8, idl.bits(3)]``, all 0 by default.
+
+    A base class that is a bitset is the IDL base.  Raises BadParameter naming the field.
+    """
+    frame = sys._getframe(1)
+
+    def decorate(undecorated: type[Any]) -> type[Any]:
+        return define_bitset(undecorated, type_name=typename, frame=frame)
+
+    return decorate
 
 
 def enum(

@@ -17,6 +17,7 @@ from .layout import ALIGNED, UNKNOWN, Encoding, Residue, has_dheader, static_siz
 from .model import (
     ArrayType,
     BitmaskType,
+    BitsetType,
     EnumType,
     Extensibility,
     IdlType,
@@ -100,10 +101,10 @@ class _KeyFinder:
     def _key(self, type_: IdlType, path: _Path, *, is_last: bool) -> None:
         emitter = self._emitter
         match type_:
-            case Primitive() | EnumType() | BitmaskType():
+            case Primitive() | EnumType() | BitmaskType() | BitsetType():
                 emitter.align(self._encoding.alignment(type_.size))
                 self.found[path] = (emitter.item(type_.code, type_.size),)
-            case String():
+            case String(wide=False):
                 self._string(type_, path)
             case ArrayType(element=Primitive(size=1)):
                 self.found[path] = (emitter.item(f"{type_.count}s", type_.count),)
@@ -165,7 +166,7 @@ class _KeyFinder:
             self._jump(emitter.item("I", 4, "h"), 1, UNKNOWN)
             return
         match type_:
-            case Primitive() | EnumType() | BitmaskType():
+            case Primitive() | EnumType() | BitmaskType() | BitsetType():
                 emitter.align(self._encoding.alignment(type_.size))
                 emitter.pass_over(type_.size)
             case String():
@@ -212,7 +213,7 @@ class _CanonicalWriter:
     def _value(self, type_: IdlType, path: _Path) -> None:
         emitter = self.emitter
         match type_:
-            case Primitive() | EnumType() | BitmaskType():
+            case Primitive() | EnumType() | BitmaskType() | BitsetType():
                 emitter.align(self._encoding.alignment(type_.size))
                 emitter.item(type_.code, type_.size, self._found[path][0])
             case String():

@@ -15,12 +15,16 @@ from dataclasses import replace
 from .layout import Encoding, largest_size
 from .model import (
     ArrayType,
+    Case,
+    Composite,
     Extensibility,
     IdlType,
+    MapType,
     Member,
     Primitive,
     SequenceType,
     StructType,
+    UnionType,
     reachable_structs,
 )
 
@@ -56,6 +60,7 @@ class _Projection:
         self._canonical = canonical
         self._final = final or canonical
         self._done: dict[int, StructType] = {}
+        self._unions: dict[int, UnionType] = {}
 
     def top(self, struct: StructType) -> StructType | None:
         return self._struct(struct) if any(member.is_key for member in struct.members) else None
@@ -69,9 +74,24 @@ class _Projection:
                 struct.type_name,
                 Extensibility.FINAL if self._final else struct.extensibility,
                 lambda: tuple(self._member(member) for member in chosen),
-                omitted=tuple(member for member in struct.members if member not in keys),
+                omitted=tuple(member for member in struct.declared if member not in keys),
             )
         return self._done[id(struct)]
+
+    def _union(self, union: UnionType) -> UnionType:
+        """The discriminator is the key where it is marked as one; else the union is, whole."""
+        if id(union) not in self._unions:
+            discriminator_only = union.discriminator.is_key
+            self._unions[id(union)] = UnionType(
+                union.python_class,
+                union.type_name,
+                Extensibility.FINAL if self._final else union.extensibility,
+                lambda: (union.discriminator, () if discriminator_only else tuple(map(self._case, union.cases))),
+            )
+        return self._unions[id(union)]
+
+    def _case(self, case: Case) -> Case:
+        return replace(case, type=self._type(case.type))
 
     def _member(self, member: Member) -> Member:
         return replace(member, type=self._type(member.type))
@@ -82,6 +102,8 @@ class _Projection:
                 return self._struct(type_)
             case SequenceType() | ArrayType():
                 return replace(type_, element=self._type(type_.element))
+            case UnionType():
+                return self._union(type_)
             case _:
                 return type_
 
@@ -99,7 +121,7 @@ def hash_is_digest(struct: StructType, canonical: StructType, encoding: Encoding
     return largest_size(canonical, 0, encoding, limit=KEY_HASH_OCTETS) > KEY_HASH_OCTETS
 
 
-def _structs_with_key(struct: StructType) -> list[StructType]:
+def _structs_with_key(struct: StructType) -> list[Composite]:
     projected = key_type(struct)
     return [] if projected is None else list(reachable_structs(projected))
 
@@ -115,5 +137,7 @@ def _differs(type_: IdlType) -> bool:
             return type_.size == 8
         case SequenceType() | ArrayType():
             return not isinstance(type_.element, Primitive) or _differs(type_.element)
+        case MapType():
+            return True
         case _:
             return getattr(type_, "size", 0) == 8

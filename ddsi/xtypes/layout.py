@@ -14,14 +14,17 @@ from ..structure.qos_policies import DataRepresentationId
 from .model import (
     ArrayType,
     BitmaskType,
+    BitsetType,
     EnumType,
     Extensibility,
     IdlType,
+    MapType,
     Member,
     Primitive,
     SequenceType,
     String,
     StructType,
+    UnionType,
 )
 
 __all__ = [
@@ -128,7 +131,9 @@ def has_dheader(type_: IdlType, encoding: Encoding) -> bool:
     match type_:
         case SequenceType() | ArrayType():
             return not isinstance(type_.element, Primitive)
-        case StructType():
+        case MapType():
+            return not (isinstance(type_.key, Primitive) and isinstance(type_.value, Primitive))
+        case StructType() | UnionType():
             return type_.extensibility is not Extensibility.FINAL
         case _:
             return False
@@ -137,12 +142,14 @@ def has_dheader(type_: IdlType, encoding: Encoding) -> bool:
 def first_alignment(type_: IdlType) -> int:
     """What the first item of a value aligns to, before the encoding's maximum."""
     match type_:
-        case Primitive() | EnumType() | BitmaskType():
+        case Primitive() | EnumType() | BitmaskType() | BitsetType():
             return type_.size
         case ArrayType():
             return first_alignment(type_.element)
         case StructType(extensibility=Extensibility.FINAL):
             return first_alignment(type_.members[0].type)
+        case UnionType(extensibility=Extensibility.FINAL):
+            return first_alignment(type_.discriminator.type)
         case _:
             return 4
 
@@ -150,7 +157,7 @@ def first_alignment(type_: IdlType) -> int:
 def static_size(type_: IdlType, start: Residue, encoding: Encoding) -> int | None:
     """Octets of any value that begins at ``start`` (leading padding included); None if that depends on the value."""
     match type_:
-        case Primitive() | EnumType() | BitmaskType():
+        case Primitive() | EnumType() | BitmaskType() | BitsetType():
             padding = start.padding(encoding.alignment(type_.size))
             return None if padding is None else padding + type_.size
         case ArrayType():
@@ -228,7 +235,7 @@ def emheader_length_code(type_: IdlType) -> int:
     units of 1, 4 or 8 octets.
     """
     match type_:
-        case Primitive() | EnumType() | BitmaskType():
+        case Primitive() | EnumType() | BitmaskType() | BitsetType():
             return {1: 0, 2: 1, 4: 2, 8: 3}[type_.size]
         case String():
             return 5
@@ -238,8 +245,12 @@ def emheader_length_code(type_: IdlType) -> int:
             return 5
         case ArrayType():
             return 4 if isinstance(type_.element, Primitive) else 5
-        case StructType():
+        case StructType() | UnionType():
             return 4
+        case MapType():
+            # A delimiter serves as the length.  Without one the value begins with a count of entries, which does not.
+            primitive = isinstance(type_.key, Primitive) and isinstance(type_.value, Primitive)
+            return 4 if primitive else 5
 
 
 def after(type_: IdlType, start: Residue, encoding: Encoding) -> Residue:
@@ -248,7 +259,7 @@ def after(type_: IdlType, start: Residue, encoding: Encoding) -> Residue:
     if size is not None:
         return start.advance(size)
     match type_:
-        case Primitive() | EnumType() | BitmaskType():
+        case Primitive() | EnumType() | BitmaskType() | BitsetType():
             return start.align(encoding.alignment(type_.size)).advance(type_.size)
         case SequenceType(element=Primitive(size=size)) if size >= 4:
             # The count is aligned; elements of 8 octets are aligned by padding that is there only with elements.
@@ -266,11 +277,11 @@ def largest_size(type_: IdlType, start: int, encoding: Encoding, *, limit: int) 
     filling each string and sequence to its bound gives the largest.
     """
     match type_:
-        case Primitive() | EnumType() | BitmaskType():
+        case Primitive() | EnumType() | BitmaskType() | BitsetType():
             alignment = encoding.alignment(type_.size)
             end: float = start + -start % alignment + type_.size
-        case String(bound=bound):
-            end = math.inf if bound is None else start + -start % 4 + 4 + bound + 1
+        case String(bound=bound, wide=wide):
+            end = math.inf if bound is None else start + -start % 4 + 4 + (2 * bound if wide else bound + 1)
         case SequenceType(bound=bound):
             start += -start % 4 + 4
             end = math.inf if bound is None else _largest_elements(type_, bound, start, encoding, limit=limit)
@@ -281,6 +292,14 @@ def largest_size(type_: IdlType, start: int, encoding: Encoding, *, limit: int) 
             for member in type_.members:
                 if end <= limit:
                     end = largest_size(member.type, int(end), encoding, limit=limit)
+        case UnionType():
+            end = largest_size(type_.discriminator.type, start, encoding, limit=limit)
+            if end <= limit:
+                start = int(end)
+                sizes = [largest_size(case.type, start, encoding, limit=limit) for case in type_.cases]
+                end = max([end, *sizes])
+        case MapType():
+            end = math.inf  # no key hash has one
     return end if end <= limit else math.inf
 
 

@@ -1,15 +1,15 @@
 """The type model: what an IDL type is, free of how Python spells it and of how CDR encodes it.
 
 DDS-XTypes 1.3 §7.2.2 (the type system).  A topic type is a :class:`StructType` whose members have types built
-from primitives, strings, enums, bitmasks, sequences, arrays and other structs.  Nodes are values, except the
-struct, which is an identity: its members are found when they are first asked for, so that types may name
-themselves and each other.  Not here (yet): unions, maps, wide strings, aliases.
+from primitives, strings, enums, bitmasks, bitsets, sequences, arrays, maps, unions and other structs.  Nodes are
+values, except structs and unions, which are identities: their members are found when they are first asked for, so
+that types may name themselves and each other.  Not here: aliases, which are transparent.
 """
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -29,15 +29,21 @@ __all__ = [
     "UINT64",
     "WCHAR",
     "ArrayType",
+    "Bitfield",
     "BitmaskType",
+    "BitsetType",
+    "Case",
+    "Composite",
     "EnumType",
     "Extensibility",
     "IdlType",
+    "MapType",
     "Member",
     "Primitive",
     "SequenceType",
     "String",
     "StructType",
+    "UnionType",
     "nested_structs",
     "reachable_structs",
 ]
@@ -92,12 +98,17 @@ FLOAT64 = Primitive("float64", "d", 8, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class String:
-    """``string`` or ``string<bound>``: UTF-8; the bound counts octets without the terminating NUL."""
+    """``string`` or ``string<bound>``: UTF-8; the bound counts octets without the terminating NUL.
+
+    ``wide``: ``wstring``, in UTF-16 without NUL; the bound counts its units of two octets.
+    """
 
     bound: int | None = None
+    wide: bool = False
 
     def __str__(self) -> str:
-        return "string" if self.bound is None else f"string<{self.bound}>"
+        name = "wstring" if self.wide else "string"
+        return name if self.bound is None else f"{name}<{self.bound}>"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +153,43 @@ class BitmaskType:
 
 
 @dataclass(frozen=True, slots=True)
+class Bitfield:
+    """Some bits of a bitset: ``width`` of them from ``position`` (0 is the lowest) up."""
+
+    name: str
+    position: int
+    width: int
+    type: Primitive
+    """What the value is to IDL: a boolean, or an integer, whose sign decides how the bits are read."""
+
+
+@dataclass(frozen=True, slots=True)
+class BitsetType:
+    """An IDL bitset: bit fields in one unsigned integer of 1, 2, 4 or 8 octets, the smallest that holds all."""
+
+    python_class: type[Any]
+    type_name: str
+    fields: tuple[Bitfield, ...]
+    base: BitsetType | None = None
+
+    @property
+    def bits(self) -> int:
+        """How many bits there are, up to the highest that a field has."""
+        return max(field.position + field.width for field in self.fields)
+
+    @property
+    def size(self) -> int:
+        return next(size for size in (1, 2, 4, 8) if self.bits <= 8 * size)
+
+    @property
+    def code(self) -> str:
+        return {1: "B", 2: "H", 4: "I", 8: "Q"}[self.size]
+
+    def __str__(self) -> str:
+        return self.type_name
+
+
+@dataclass(frozen=True, slots=True)
 class SequenceType:
     """``sequence<element>`` or ``sequence<element, bound>``; ``numpy`` when the values come back as numpy arrays."""
 
@@ -174,8 +222,24 @@ class ArrayType:
 
 
 @dataclass(frozen=True, slots=True)
+class MapType:
+    """``map<key, value>`` or ``map<key, value, bound>``: a dict in Python."""
+
+    key: IdlType
+    value: IdlType
+    bound: int | None = None
+
+    def __str__(self) -> str:
+        bound = "" if self.bound is None else f", {self.bound}"
+        return f"map<{self.key}, {self.value}{bound}>"
+
+
+@dataclass(frozen=True, slots=True)
 class Member:
-    """A member of a struct.  ``default`` makes the value that it has when a sample leaves it out."""
+    """A member of a struct or union.  ``default`` makes the value that it has when a sample leaves it out.
+
+    ``name`` is that of the Python attribute; ``idl_name``, empty where both are the same, that of the IDL member.
+    """
 
     name: str
     id: int
@@ -184,20 +248,38 @@ class Member:
     is_optional: bool = False
     must_understand: bool = False
     default: Callable[[], Any] | None = None
+    idl_name: str = ""
+    is_external: bool = False
+    is_serialized: bool = True
+
+    @property
+    def name_in_idl(self) -> str:
+        """The member's name as other programs know it."""
+        return self.idl_name or self.name
+
+
+@dataclass(frozen=True, slots=True)
+class Case(Member):
+    """A member of a union: there when the discriminator is one of ``labels``, or none of any case (``is_default``)."""
+
+    labels: tuple[Any, ...] = ()
+    is_default: bool = False
 
 
 class StructType:
     """A struct: the identity of a topic type, of a nested type, or of a projection of one (see ``keys.py``).
 
-    ``members`` holds the base's members first.  ``omitted`` is empty but for projections: the members of the
-    Python class which this type does not have on the wire.
+    ``members`` holds the base's members first.  ``omitted`` are the members of the Python class which this type does
+    not have on the wire: those not serialized, and in projections those left out.
     """
 
     __slots__ = (
+        "_declared",
         "_members",
         "_resolve",
         "base",
         "extensibility",
+        "is_nested",
         "omitted",
         "python_class",
         "static_sizes",
@@ -217,14 +299,17 @@ class StructType:
         *,
         base: StructType | None = None,
         omitted: tuple[Member, ...] = (),
+        is_nested: bool = False,
     ) -> None:
         self.python_class = python_class
         self.type_name = type_name
         self.extensibility = extensibility
+        self.is_nested = is_nested
         self.base = base
         self.omitted = omitted
         self._resolve = resolve
         self._members: tuple[Member, ...] | None = None
+        self._declared: tuple[Member, ...] | None = None
         self.zero_cost: int | None = None  # what ``defaults.zero_cost`` found
         self.static_sizes: dict[Any, int | None] = {}  # what ``layout.static_size`` found
 
@@ -232,8 +317,20 @@ class StructType:
     def members(self) -> tuple[Member, ...]:
         """All members in declaration order; ``NameError`` while an annotation names what is not yet defined."""
         if self._members is None:
-            self._members = self._resolve()
+            found = self._resolve()
+            self._members = tuple(member for member in found if member.is_serialized)
+            if len(self._members) < len(found):
+                self.omitted += tuple(member for member in found if not member.is_serialized)
+                self._declared = found
         return self._members
+
+    @property
+    def declared(self) -> tuple[Member, ...]:
+        """All members that the Python class has, base first, those included that do not travel."""
+        if self._declared is None:
+            members = self.members
+            self._declared = self._declared or (*members, *self.omitted)
+        return self._declared
 
     def __str__(self) -> str:
         return self.type_name
@@ -242,22 +339,105 @@ class StructType:
         return f"<StructType {self.type_name} {self.extensibility.value}>"
 
 
-IdlType = Primitive | String | EnumType | BitmaskType | SequenceType | ArrayType | StructType
+class UnionType:
+    """A union: a discriminator and at most one member, which the discriminator selects (DDS-XTypes 1.3 §7.2.2.4.4.5).
+
+    In Python its object holds ``_idl_discriminator`` and ``_idl_value`` (see ``unions.py``).
+    """
+
+    __slots__ = ("_found", "_resolve", "_selection", "extensibility", "is_nested", "python_class", "type_name")
+
+    def __init__(
+        self,
+        python_class: type[Any],
+        type_name: str,
+        extensibility: Extensibility,
+        resolve: Callable[[], tuple[Member, tuple[Case, ...]]],
+        *,
+        is_nested: bool = False,
+    ) -> None:
+        self.python_class = python_class
+        self.type_name = type_name
+        self.extensibility = extensibility
+        self.is_nested = is_nested
+        self._resolve = resolve
+        self._found: tuple[Member, tuple[Case, ...]] | None = None
+        self._selection: dict[Any, int] | None = None
+
+    @property
+    def discriminator(self) -> Member:
+        return self._resolved()[0]
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        return self._resolved()[1]
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """The discriminator and all cases."""
+        return (self.discriminator, *self.cases)
+
+    @property
+    def selection(self) -> Mapping[Any, int]:
+        """The index in ``cases`` that each label selects."""
+        if self._selection is None:
+            self._selection = {label: index for index, case in enumerate(self.cases) for label in case.labels}
+        return self._selection
+
+    @property
+    def default_index(self) -> int:
+        """The index in ``cases`` for a discriminator that is no label; -1 if then there is no member."""
+        return next((index for index, case in enumerate(self.cases) if case.is_default), -1)
+
+    def case_of(self, discriminator: Any) -> Case | None:
+        """The member that a discriminator selects."""
+        index = self.selection.get(discriminator, self.default_index)
+        return None if index < 0 else self.cases[index]
+
+    def _resolved(self) -> tuple[Member, tuple[Case, ...]]:
+        if self._found is None:
+            self._found = self._resolve()
+        return self._found
+
+    def __str__(self) -> str:
+        return self.type_name
+
+    def __repr__(self) -> str:
+        return f"<UnionType {self.type_name} {self.extensibility.value}>"
+
+
+Composite = StructType | UnionType
+
+IdlType = (
+    Primitive
+    | String
+    | EnumType
+    | BitmaskType
+    | BitsetType
+    | SequenceType
+    | ArrayType
+    | MapType
+    | StructType
+    | UnionType
+)
 """Any type that a member may have."""
 
 
-def nested_structs(type_: IdlType) -> Iterator[StructType]:
-    """The struct that a type is, or that its elements are; nothing for the others."""
+def nested_structs(type_: IdlType) -> Iterator[Composite]:
+    """The struct or union that a type is, or that its elements are; nothing for the others."""
     while isinstance(type_, (SequenceType, ArrayType)):
         type_ = type_.element
-    if isinstance(type_, StructType):
+    if isinstance(type_, MapType):
+        yield from nested_structs(type_.key)
+        yield from nested_structs(type_.value)
+    elif isinstance(type_, (StructType, UnionType)):
         yield type_
 
 
-def reachable_structs(struct: StructType) -> Iterator[StructType]:
-    """``struct`` and every struct inside it, each once, outermost first."""
+def reachable_structs(struct: Composite) -> Iterator[Composite]:
+    """``struct`` and every struct or union inside it, each once, outermost first."""
     seen: set[int] = set()
-    pending = [struct]
+    pending: list[Composite] = [struct]
     while pending:
         candidate = pending.pop(0)
         if id(candidate) not in seen:

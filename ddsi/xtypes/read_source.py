@@ -6,7 +6,7 @@ as the octets differ.  Its caller then reads again with ``careful_reader.py``, w
 and says where octets are malformed.  The prediction is safe by itself: no count is trusted before the octets
 it speaks of are there, recursion is bounded, and time is linear in the payload.
 
-Here are structs and their members; ``read_values.py`` has the rest.
+Here are structs, unions and their members; ``read_values.py`` has the rest.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from collections.abc import Callable
 from typing import Any
 
 from . import buffers
+from .bitsets import bitset_from
 from .defaults import default_value
 from .enumerations import bitmask_from
 from .layout import ALIGNED, UNKNOWN, Encoding, emheader_length_code, has_dheader, static_size
-from .model import Extensibility, Member, StructType
+from .model import Composite, Extensibility, Member, StructType, UnionType
 from .read_emitter import ReadEmitter
 from .read_values import ValueReader, enumerations, numpy_numbers
 from .recursion import FunctionPlan
@@ -47,6 +48,7 @@ def generate_reader(
         "numpy_numbers": numpy_numbers,
         "enumerations": enumerations,
         "bitmask_from": bitmask_from,
+        "bitset_from": bitset_from,
     }
     reader = _TypeReader(source, encoding, FunctionPlan(struct_type), view=view)
     with source.block("def read(d):"):
@@ -55,7 +57,7 @@ def generate_reader(
 
 
 class _TypeReader(ValueReader):
-    """Reads structs."""
+    """Reads structs and unions."""
 
     def top(self, type_: StructType) -> None:
         emitter = self._emitter
@@ -82,10 +84,16 @@ class _TypeReader(ValueReader):
     # --- structs -----------------------------------------------------------------------------------------
 
     def _struct(self, type_: StructType) -> str:
+        return self._composite(type_)
+
+    def _union(self, type_: UnionType) -> str:
+        return self._composite(type_)
+
+    def _composite(self, type_: Composite) -> str:
         function = self._plan.function(type_)
         if function is None:
             with self._plan.inside():
-                return self._struct_body(type_)
+                return self._composite_body(type_)
         name, is_new = function
         if is_new:
             with self._source.apart(), self._plan.inside(0):
@@ -97,21 +105,21 @@ class _TypeReader(ValueReader):
         emitter.move(position, UNKNOWN)
         return value
 
-    def _write_function(self, name: str, type_: StructType) -> None:
+    def _write_function(self, name: str, type_: Composite) -> None:
         outer, outer_depth = self._emitter, self._depth
         emitter = ReadEmitter(self._source, self._encoding, base="p", offset=0, residue=UNKNOWN)
         emitter.origin = "o"
         self._emitter, self._depth = emitter, "depth"
         with self._source.block(f"def {name}(d, p, o, depth):"):
             emitter.refuse(f"depth > {StructType.MAX_DEPTH}")
-            value = self._struct_body(type_)
+            value = self._composite_body(type_)
             emitter.flush()
             self._source.line(f"return {value}, {emitter.position}")
         self._emitter, self._depth = outer, outer_depth
 
-    def _struct_body(self, type_: StructType) -> str:
+    def _composite_body(self, type_: Composite) -> str:
         if not has_dheader(type_, self._encoding):
-            return self._struct_members(type_, "")
+            return self._composite_members(type_, "")
         emitter = self._emitter
         emitter.align(4)
         size = static_size(type_, emitter.residue, self._encoding)
@@ -122,23 +130,53 @@ class _TypeReader(ValueReader):
         else:
             end = f"{length}_end"
             emitter.then(f"{end} = {start} + {length}")
-        value = self._struct_members(type_, end)
+        value = self._composite_members(type_, end)
         if size is None:
             emitter.flush()
             emitter.refuse(f"{emitter.position} != {end}")
         return value
 
+    def _composite_members(self, type_: Composite, end: str) -> str:
+        return self._struct_members(type_, end) if isinstance(type_, StructType) else self._union_members(type_)
+
     def _struct_members(self, type_: StructType, end: str) -> str:
         """``end`` is the variable with the index where the delimiter says the struct ends, if it has one."""
         mutable = type_.extensibility is Extensibility.MUTABLE
         values = [(member.name, self._member(member, end, mutable=mutable)) for member in type_.members]
-        emitter = self._emitter
-        if mutable and not self._encoding.is_xcdr2:
-            emitter.align(4)
-            sentinel = emitter.item("I", 4, "h")
-            number = PID_LIST_END_MUST_UNDERSTAND
-            emitter.refuse(f"{sentinel} != {number if self._encoding.little_endian else number << 16}")
+        if mutable:
+            self._end_parameters()
         return self._construct(type_, values)
+
+    def _end_parameters(self) -> None:
+        if not self._encoding.is_xcdr2:
+            self._emitter.align(4)
+            sentinel = self._emitter.item("I", 4, "h")
+            number = PID_LIST_END_MUST_UNDERSTAND
+            self._emitter.refuse(f"{sentinel} != {number if self._encoding.little_endian else number << 16}")
+
+    def _union_members(self, type_: UnionType) -> str:
+        """The discriminator, then the member that it selects, if any."""
+        emitter, source = self._emitter, self._source
+        mutable = type_.extensibility is Extensibility.MUTABLE
+        expression = self._parameter(type_.discriminator) if mutable else self.value(type_.discriminator.type)
+        emitter.flush()
+        discriminator, index, value = source.fresh("d"), source.fresh("k"), source.fresh("x")
+        emitter.then(f"{discriminator} = {expression}")
+        selection = source.constant("selection", type_.selection)
+        emitter.then(f"{index} = {selection}.get({discriminator}, {type_.default_index})")
+        with emitter.branches() as alternatives:
+            for number, case in enumerate(type_.cases):
+                with alternatives.branch(f"if {index} == {number}:"):
+                    self._assign(value, self._parameter(case) if mutable else self.value(case.type))
+            with alternatives.branch(f"if {index} < 0:"):
+                self._assign(value, "None")
+        if mutable:
+            self._end_parameters()
+        union = source.fresh("o")
+        emitter.then(f"{union} = new({source.constant(type_.python_class.__name__ + '_', type_.python_class)})")
+        emitter.then(f"{union}._idl_discriminator = {discriminator}")
+        emitter.then(f"{union}._idl_value = {value}")
+        return union
 
     def _construct(self, type_: StructType, values: list[tuple[str, str]]) -> str:
         """Set the slots one by one: twice as fast as ``__init__``, which only would do the same."""

@@ -18,13 +18,16 @@ from .model import (
     WCHAR,
     ArrayType,
     BitmaskType,
+    BitsetType,
     EnumType,
     Extensibility,
     IdlType,
+    MapType,
     Primitive,
     SequenceType,
     String,
     StructType,
+    UnionType,
 )
 from .read_emitter import ReadEmitter
 from .recursion import FunctionPlan
@@ -69,9 +72,11 @@ class ValueReader:
 
     def value(self, type_: IdlType) -> str:
         match type_:
-            case Primitive() | EnumType() | BitmaskType():
+            case Primitive() | EnumType() | BitmaskType() | BitsetType():
                 self._emitter.align(self._encoding.alignment(type_.size))
                 return self._item(type_, self._emitter.item(type_.code, type_.size))
+            case String(wide=True):
+                return self._wide_string(type_)
             case String():
                 return self._string(type_)
             case SequenceType(element=Primitive() as element):
@@ -82,15 +87,21 @@ class ValueReader:
                 return self._primitive_array(type_, element)
             case ArrayType():
                 return self._array(type_)
+            case MapType():
+                return self._map(type_)
             case StructType():
                 return self._struct(type_)
+            case UnionType():
+                return self._union(type_)
 
-    def _item(self, type_: Primitive | EnumType | BitmaskType, raw: str) -> str:
+    def _item(self, type_: Primitive | EnumType | BitmaskType | BitsetType, raw: str) -> str:
         match type_:
             case EnumType():
                 return f"{self._enum_table(type_)}[{raw}]"
             case BitmaskType():
                 return f"bitmask_from({self._source.constant('Flags', type_.python_class)}, {raw})"
+            case BitsetType():
+                return f"bitset_from({self._source.constant('bitset', type_)}, {raw})"
         if type_ == BOOLEAN:
             return f"(False, True)[{raw}]"
         return f"chr({raw})" if type_ in (CHAR, WCHAR) else raw
@@ -117,6 +128,20 @@ class ValueReader:
         condition = f"d[{end} - 1]"
         emitter.refuse(condition if type_.bound is None else f"{condition} or {count} > {type_.bound + 1}")
         emitter.move(end, UNKNOWN)
+        return text
+
+    def _wide_string(self, type_: String) -> str:
+        emitter = self._emitter
+        emitter.align(4)
+        count = emitter.item("I", 4, "n")
+        emitter.refuse(f"{count} & 1" if type_.bound is None else f"{count} & 1 or {count} > {2 * type_.bound}")
+        emitter.flush()
+        start, residue = emitter.position, emitter.residue.advance_multiple(2)
+        end, text = self._source.fresh("e"), self._source.fresh("s")
+        emitter.then(f"{end} = {start} + {count}")
+        emitter.refuse(f"{end} > len(d)")
+        emitter.then(f"{text} = {self._characters(WCHAR, f'd[{start}:{end}]')}")
+        emitter.move(end, residue)
         return text
 
     # --- collections -------------------------------------------------------------------------------------
@@ -213,7 +238,7 @@ class ValueReader:
         emitter, encoding = self._emitter, self._encoding
         emitter.flush()
         value = self._source.fresh("l")
-        if isinstance(element, (EnumType, BitmaskType)):
+        if isinstance(element, (EnumType, BitmaskType, BitsetType)):
             self._enumeration_elements(element, count, value)
             return value
         emitter.then(f"{value} = []")
@@ -231,13 +256,35 @@ class ValueReader:
             emitter.then(f"{value}.append({expression})")
         return value
 
-    def _enumeration_elements(self, element: EnumType | BitmaskType, count: str, value: str) -> None:
+    def _map(self, type_: MapType) -> str:
+        emitter = self._emitter
+        delimiter = self._open_dheader(type_)
+        emitter.align(4)
+        count = emitter.item("I", 4, "n")
+        # An entry has two octets at least: a count that promises more than there is ends with an IndexError early.
+        emitter.refuse(f"2 * {count} > len(d)" + (f" or {count} > {type_.bound}" if type_.bound is not None else ""))
+        value = self._source.fresh("m")
+        emitter.flush()
+        emitter.then(f"{value} = {{}}")
+        with emitter.loop(f"for _ in range({count}):", UNKNOWN):
+            key = self._source.fresh("x")
+            expression = self.value(type_.key)
+            emitter.flush()
+            emitter.then(f"{key} = {expression}")
+            expression = self.value(type_.value)
+            emitter.flush()
+            emitter.then(f"{value}[{key}] = {expression}")
+        emitter.refuse(f"len({value}) != {count}")
+        self._close_dheader(delimiter)
+        return value
+
+    def _enumeration_elements(self, element: EnumType | BitmaskType | BitsetType, count: str, value: str) -> None:
         emitter = self._emitter
         emitter.align(self._encoding.alignment(element.size))
         if isinstance(element, EnumType):
             make = f"{self._enum_table(element)}.__getitem__"
         else:
-            make = f"lambda number: bitmask_from({self._source.constant('Flags', element.python_class)}, number)"
+            make = f"lambda number: {self._item(element, 'number')}"
         item_format = self._encoding.order + element.code
         residue = emitter.residue.advance_multiple(element.size)
         emitter.then(f"{value} = enumerations(d, {emitter.position}, {count}, '{item_format}', {element.size}, {make})")
@@ -250,7 +297,7 @@ class ValueReader:
         if not isinstance(element, StructType) or has_dheader(element, self._encoding):
             return False
         return element.extensibility is not Extensibility.MUTABLE and all(
-            isinstance(member.type, (Primitive, EnumType, BitmaskType))
+            isinstance(member.type, (Primitive, EnumType, BitmaskType, BitsetType))
             or (isinstance(member.type, ArrayType) and self._is_small(member.type))
             or self._is_run(member.type)
             for member in element.members
@@ -291,4 +338,7 @@ class ValueReader:
             self._emitter.refuse(f"{self._emitter.position} != {start} + {length}")
 
     def _struct(self, type_: StructType) -> str:
+        raise NotImplementedError
+
+    def _union(self, type_: UnionType) -> str:
         raise NotImplementedError

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from .model import StructType, nested_structs, reachable_structs
+from .model import Composite, nested_structs, reachable_structs
 
 __all__ = ["FunctionPlan", "is_recursive"]
 
@@ -21,7 +21,7 @@ _DEEPEST_INLINED = 8
 """Structs in line inside one another.  Each may open a loop, and Python nests 20 of them."""
 
 
-def is_recursive(struct: StructType) -> bool:
+def is_recursive(struct: Composite) -> bool:
     """Whether values of the struct may contain values of itself."""
     return any(
         inner is struct
@@ -34,14 +34,14 @@ def is_recursive(struct: StructType) -> bool:
 class FunctionPlan:
     """Decides while one module is generated."""
 
-    def __init__(self, root: StructType) -> None:
+    def __init__(self, root: Composite) -> None:
         self._recursive = {id(struct) for struct in reachable_structs(root) if is_recursive(struct)}
         self._functions: dict[int, str] = {}
         self._inlined = 0
         self._depth = 0
         self._inlining_all = False
 
-    def function(self, struct: StructType) -> tuple[str, bool] | None:
+    def function(self, struct: Composite) -> tuple[str, bool] | None:
         """None: write it in line.  Else the function's name, and True when it is yet to be written."""
         if self._inlining_all:
             return None

@@ -18,14 +18,14 @@ from typing import Annotated, Any
 
 from ..structure.errors import BadParameter
 from . import model
-from .annotations import Array, Bound, ElementOf, Flag, HashId, MemberId
+from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName
 from .enumerations import bitmask_type, enum_type
-from .model import ArrayType, IdlType, Primitive, SequenceType, String, StructType
+from .model import ArrayType, BitsetType, IdlType, MapType, Primitive, SequenceType, String, StructType, UnionType
 
 __all__ = ["Resolved", "Resolver"]
 
 STRUCT_ATTRIBUTE = "__idl_struct__"
-"""Where a class decorated with ``idl.struct`` keeps its :class:`StructType`."""
+"""Where a class decorated with ``idl.struct``, ``idl.union`` or ``idl.bitset`` keeps the type that it is."""
 
 _NUMPY_NUMBERS = {
     primitive.name: primitive
@@ -34,6 +34,8 @@ _NUMPY_NUMBERS = {
         *(model.UINT8, model.UINT16, model.UINT32, model.UINT64),
     )
 }
+
+_MAPS = (dict, collections.abc.Mapping, collections.abc.MutableMapping)
 
 _SEQUENCES = (list, collections.abc.Sequence, collections.abc.MutableSequence)
 
@@ -45,6 +47,8 @@ class Resolved:
     type: IdlType
     flags: set[str] = field(default_factory=set)
     member_id: MemberId | HashId | None = None
+    idl_name: str = ""
+    bits: Bits | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +96,10 @@ class Resolver:
 
     def _annotated(self, base: Any, markers: list[Any]) -> Resolved:
         markers = [inner for marker in markers for inner in (marker if isinstance(marker, tuple) else (marker,))]
-        given = [marker for marker in markers if isinstance(marker, (Primitive, ElementOf))]
+        given = [marker for marker in markers if isinstance(marker, (Primitive, String, ElementOf))]
         if not given:
             resolved = self.resolve(base)
-        elif isinstance(given[0], Primitive):
+        elif isinstance(given[0], (Primitive, String)):
             resolved = Resolved(given[0])
         else:
             element = self.resolve(given[0].annotation).type
@@ -114,6 +118,10 @@ class Resolver:
                 resolved.flags.add(marker.name)
             case MemberId() | HashId():
                 resolved.member_id = marker
+            case MemberName(name=name):
+                resolved.idl_name = name
+            case Bits():
+                resolved.bits = marker
             case types.FunctionType() if marker.__module__.endswith(".xtypes.idl"):
                 raise BadParameter(f"idl.{marker.__name__} needs its argument, as in idl.{marker.__name__}(8)")
             case _:
@@ -122,7 +130,7 @@ class Resolver:
     def _optional(self, alternatives: tuple[Any, ...]) -> Resolved:
         present = [alternative for alternative in alternatives if alternative is not type(None)]
         if len(present) != 1 or len(present) == len(alternatives):
-            raise BadParameter("a choice of types is an IDL union, which is not supported yet")
+            raise BadParameter("a choice of types is an IDL union: a class decorated with @idl.union")
         resolved = self.resolve(present[0])
         resolved.flags.add("optional")
         return resolved
@@ -131,7 +139,10 @@ class Resolver:
 
     def _plain(self, annotation: Any, origin: Any) -> IdlType:
         if origin in _SEQUENCES:
-            return self._sequence(typing.get_args(annotation)[0])
+            return SequenceType(self._element(typing.get_args(annotation)[0], "sequence"))
+        if origin in _MAPS:
+            key, value = typing.get_args(annotation)
+            return MapType(_checked_key(self._element(key, "map")), self._element(value, "map"))
         if _is_ndarray(origin or annotation):
             return _numpy_sequence(annotation)
         if annotation is str:
@@ -146,26 +157,35 @@ class Resolver:
             return _class_type(annotation)
         raise BadParameter(_why_not(annotation, origin))
 
-    def _sequence(self, element: Any) -> SequenceType:
+    def _element(self, element: Any, collection: str) -> IdlType:
         resolved = self.resolve(element)
         unfit = resolved.flags | ({"id"} if resolved.member_id is not None else set())
         if unfit:
-            raise BadParameter(f"idl.{min(unfit)} belongs to the member, not to the elements of its sequence")
-        return SequenceType(resolved.type)
+            raise BadParameter(f"idl.{min(unfit)} belongs to the member, not to the elements of its {collection}")
+        return resolved.type
+
+
+def _checked_key(type_: IdlType) -> IdlType:
+    """What may be a key of a map: hashable in Python, and compared by value."""
+    if isinstance(type_, (SequenceType, ArrayType, MapType, StructType, UnionType, BitsetType)):
+        raise BadParameter(f"a map's key is a number, a string, a character, a boolean or an enum, not {type_}")
+    return type_
 
 
 def _bounded(type_: IdlType, limit: int) -> IdlType:
     match type_:
         case String(bound=None):
-            return String(limit)
+            return String(limit, type_.wide)
+        case MapType(bound=None):
+            return MapType(type_.key, type_.value, limit)
         case SequenceType(bound=None):
             return SequenceType(type_.element, limit, type_.numpy)
         case ArrayType():
             raise BadParameter("idl.bound stands before idl.array, or on the element")
-        case String() | SequenceType():
+        case String() | SequenceType() | MapType():
             raise BadParameter("idl.bound is given twice")
         case _:
-            raise BadParameter(f"idl.bound fits strings and sequences, not {type_}")
+            raise BadParameter(f"idl.bound fits strings, sequences and maps, not {type_}")
 
 
 def _array(type_: IdlType, dimensions: tuple[int, ...]) -> ArrayType:
@@ -179,9 +199,9 @@ def _array(type_: IdlType, dimensions: tuple[int, ...]) -> ArrayType:
 
 
 def _class_type(annotation: type[Any]) -> IdlType:
-    struct = annotation.__dict__.get(STRUCT_ATTRIBUTE)
-    if isinstance(struct, StructType):
-        return struct
+    described = annotation.__dict__.get(STRUCT_ATTRIBUTE)
+    if isinstance(described, (StructType, UnionType, BitsetType)):
+        return described
     if issubclass(annotation, enum.IntFlag):
         return bitmask_type(annotation)
     if issubclass(annotation, enum.IntEnum):
@@ -193,13 +213,13 @@ def _why_not(annotation: Any, origin: Any) -> str:
     shown = getattr(annotation, "__name__", None) or repr(annotation)
     if annotation is int:
         return "int does not say its width; use idl.int32 or another of idl's integers"
-    if dict in (annotation, origin) or origin is collections.abc.Mapping:
-        return "maps are not supported yet"
+    if annotation in _MAPS:
+        return f"{shown} does not say of what; use idl.map[key, value]"
     if annotation in _SEQUENCES:
         return f"{shown} does not say of what; use idl.sequence[...]"
     if tuple in (annotation, origin):
         return "a tuple is no IDL type; use idl.sequence[...], with idl.array(n) for a fixed number of elements"
-    if isinstance(annotation, Flag | Bound | Array | MemberId | HashId):
+    if isinstance(annotation, Flag | Bound | Array | MemberId | HashId | MemberName | Bits):
         return f"{annotation!r} stands inside Annotated[type, ...], behind a type"
     if isinstance(annotation, type) and issubclass(annotation, enum.Enum):
         return f"{shown} is an Enum; IDL enums are enum.IntEnum, bitmasks enum.IntFlag"

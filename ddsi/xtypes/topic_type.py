@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from ..structure.errors import BadParameter
 from ..structure.qos_policies import DataRepresentationId
-from .model import ArrayType, Extensibility, IdlType, StructType, reachable_structs
+from .defaults import default_value
+from .model import (
+    ArrayType,
+    Composite,
+    Extensibility,
+    IdlType,
+    Member,
+    StructType,
+    UnionType,
+    reachable_structs,
+)
 from .recursion import is_recursive
 
 __all__ = ["complete", "default_representations"]
@@ -25,17 +35,17 @@ def complete(struct: StructType) -> StructType:
     return struct
 
 
-def _refuse_endless(struct: StructType) -> None:
+def _refuse_endless(struct: Composite) -> None:
     """A struct that holds itself by value has no finite sample."""
-    pending = [struct]
+    pending: list[Composite] = [struct]
     seen: set[int] = set()
     while pending:
         candidate = pending.pop()
-        for member in candidate.members:
+        for member in _by_value(candidate):
             type_: IdlType = member.type
             while isinstance(type_, ArrayType):
                 type_ = type_.element
-            if member.is_optional or not isinstance(type_, StructType):
+            if not isinstance(type_, (StructType, UnionType)):
                 continue
             if type_ is struct:
                 raise BadParameter(
@@ -45,6 +55,14 @@ def _refuse_endless(struct: StructType) -> None:
             if id(type_) not in seen:
                 seen.add(id(type_))
                 pending.append(type_)
+
+
+def _by_value(composite: Composite) -> list[Member]:
+    """The members that every sample has; of a union the one that is there by default."""
+    if isinstance(composite, StructType):
+        return [member for member in composite.members if not member.is_optional]
+    case = composite.case_of(default_value(composite.discriminator))
+    return [] if case is None else [case]
 
 
 def default_representations(struct: StructType) -> tuple[DataRepresentationId, ...]:

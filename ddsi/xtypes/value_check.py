@@ -19,13 +19,16 @@ from .model import (
     BOOLEAN,
     ArrayType,
     BitmaskType,
+    BitsetType,
     EnumType,
     IdlType,
+    MapType,
     Member,
     Primitive,
     SequenceType,
     String,
     StructType,
+    UnionType,
 )
 
 __all__ = ["check_sample", "check_value"]
@@ -56,6 +59,12 @@ def _check(type_: IdlType, value: Any, path: str, depth: int) -> None:
             _check_enum(type_, value, path)
         case BitmaskType():
             _check_integer(type_.code, type_.size, value, path, f"flags of {type_.type_name}")
+        case BitsetType():
+            _check_bitset(type_, value, path)
+        case MapType():
+            _check_map(type_, value, path, depth)
+        case UnionType():
+            _check_union(type_, value, path, depth)
         case SequenceType():
             _check_sequence(type_, value, path, depth)
         case ArrayType():
@@ -97,6 +106,9 @@ def _check_integer(code: str, size: int, value: Any, path: str, name: str) -> No
 def _check_string(type_: String, value: Any, path: str) -> None:
     if not isinstance(value, str):
         raise BadParameter(f"{path}: {_shown(value)} is no string")
+    if type_.wide:
+        _check_wide_string(type_, value, path)
+        return
     try:
         encoded = value.encode()
     except UnicodeEncodeError as error:
@@ -105,6 +117,44 @@ def _check_string(type_: String, value: Any, path: str) -> None:
         raise BadParameter(f"{path}: {_shown(value)} contains a NUL, which ends a string on the wire")
     if type_.bound is not None and len(encoded) > type_.bound:
         raise BadParameter(f"{path}: a string of {len(encoded)} octets exceeds its bound of {type_.bound}")
+
+
+def _check_wide_string(type_: String, value: str, path: str) -> None:
+    if "\0" in value:
+        raise BadParameter(f"{path}: {_shown(value)} contains a NUL, which ends a string")
+    units = len(value.encode("utf-16-le", "surrogatepass")) // 2
+    if type_.bound is not None and units > type_.bound:
+        raise BadParameter(f"{path}: a wide string of {units} characters exceeds its bound of {type_.bound}")
+
+
+def _check_bitset(type_: BitsetType, value: Any, path: str) -> None:
+    if not isinstance(value, type_.python_class):
+        raise BadParameter(f"{path}: {_shown(value)} is no {type_.python_class.__name__}")
+    try:
+        operator.index(value)
+    except BadParameter as error:
+        raise BadParameter(f"{path}.{error}") from None
+
+
+def _check_map(type_: MapType, value: Any, path: str, depth: int) -> None:
+    if not hasattr(value, "items") or not hasattr(value, "__len__"):
+        raise BadParameter(f"{path}: {_shown(value)} is no dict of {type_.key} to {type_.value}")
+    if type_.bound is not None and len(value) > type_.bound:
+        raise BadParameter(f"{path}: {len(value)} entries exceed the bound of {type_.bound}")
+    for key, item in value.items():
+        _check(type_.key, key, f"{path}, key {_shown(key)}", depth)
+        _check(type_.value, item, f"{path}[{_shown(key)}]", depth)
+
+
+def _check_union(type_: UnionType, value: Any, path: str, depth: int) -> None:
+    if not isinstance(value, type_.python_class):
+        raise BadParameter(f"{path}: {_shown(value)} is no {type_.python_class.__name__}")
+    if depth >= StructType.MAX_DEPTH:
+        raise BadParameter(f"{path}: types are nested deeper than {StructType.MAX_DEPTH}")
+    _check(type_.discriminator.type, value._idl_discriminator, f"{path}.{type_.discriminator.name}", depth)
+    case = type_.case_of(value._idl_discriminator)
+    if case is not None:
+        _check(case.type, value._idl_value, f"{path}.{case.name}", depth + 1)
 
 
 def _check_enum(type_: EnumType, value: Any, path: str) -> None:

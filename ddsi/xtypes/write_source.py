@@ -5,7 +5,7 @@ unfit value makes Python raise (``value_check.py`` then finds the member and say
 :mod:`struct` does not check, such as bounds, ``ValueError``.  Nested structs are written in line; recursive ones
 have a function of their own.
 
-Here are structs and their members; ``write_values.py`` has the rest.
+Here are structs, unions and their members; ``write_values.py`` has the rest.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from . import buffers
 from .layout import ALIGNED, UNKNOWN, Encoding, emheader_length_code, static_size
-from .model import Extensibility, Member, StructType
+from .model import Composite, Extensibility, Member, StructType, UnionType
 from .recursion import FunctionPlan
 from .source import Source
 from .write_emitter import Position, WriteEmitter
@@ -57,7 +57,7 @@ _RUNTIME = (
 
 
 class _TypeWriter(ValueWriter):
-    """Writes structs."""
+    """Writes structs and unions."""
 
     def top(self, type_: StructType, *, header: bool, padded: bool) -> None:
         emitter = self._emitter
@@ -91,10 +91,16 @@ class _TypeWriter(ValueWriter):
     # --- structs -----------------------------------------------------------------------------------------
 
     def _struct(self, type_: StructType, expression: str) -> None:
+        self._composite(type_, expression)
+
+    def _union(self, type_: UnionType, expression: str) -> None:
+        self._composite(type_, expression)
+
+    def _composite(self, type_: Composite, expression: str) -> None:
         function = self._plan.function(type_)
         if function is None:
             with self._plan.inside():
-                self.struct_body(type_, self._local("v", expression))
+                self._body(type_, self._local("v", expression))
             return
         name, is_new = function
         if is_new:
@@ -102,13 +108,19 @@ class _TypeWriter(ValueWriter):
                 self._write_function(f"write_{name}", type_)
         self._emitter.call(f"write_{name}", expression, f"{self._depth} + 1")
 
-    def _write_function(self, name: str, type_: StructType) -> None:
+    def _body(self, type_: Composite, value: str) -> None:
+        if isinstance(type_, StructType):
+            self.struct_body(type_, value)
+        else:
+            self.union_body(type_, value)
+
+    def _write_function(self, name: str, type_: Composite) -> None:
         outer, outer_depth = self._emitter, self._depth
         position = Position(("p",), 0, UNKNOWN)
         self._emitter, self._depth = WriteEmitter(self._source, self._encoding, position, listed=True), "depth"
         with self._source.block(f"def {name}(v, parts, p, depth):"):
             self._refuse(f"depth > {StructType.MAX_DEPTH}")
-            self.struct_body(type_, "v")
+            self._body(type_, "v")
             self._emitter.flush()
             self._source.line(f"return {self._emitter.position}")
         self._emitter, self._depth = outer, outer_depth
@@ -124,10 +136,36 @@ class _TypeWriter(ValueWriter):
                 self._parameter(member, expression)
             else:
                 self.value(member.type, expression)
-        if mutable and not self._encoding.is_xcdr2:
+        if mutable:
+            self._end_parameters()
+        self._close_dheader(delimiter)
+
+    def _end_parameters(self) -> None:
+        if not self._encoding.is_xcdr2:
             self._emitter.align(4)
             self._emitter.item("H", 2, str(PID_LIST_END_MUST_UNDERSTAND))
             self._emitter.item("H", 2, "0")
+
+    def union_body(self, type_: UnionType, value: str) -> None:
+        """The discriminator, then the member that it selects, if any (DDS-XTypes 1.3 §7.4.3.5.3)."""
+        source = self._source
+        self._refuse(f"{value}.__class__ is not {source.constant('Union', type_.python_class)}")
+        delimiter = self._open_dheader(type_)
+        mutable = type_.extensibility is Extensibility.MUTABLE
+        write_member = self._parameter if mutable else lambda member, expression: self.value(member.type, expression)
+        discriminator = self._local("d", f"{value}._idl_discriminator")
+        write_member(type_.discriminator, discriminator)
+        index = self._local(
+            "k", f"{source.constant('selection', type_.selection)}.get({discriminator}, {type_.default_index})"
+        )
+        with self._emitter.branches() as alternatives:
+            for number, case in enumerate(type_.cases):
+                with alternatives.branch(f"if {index} == {number}:"):
+                    write_member(case, f"{value}._idl_value")
+            with alternatives.branch(f"if {index} < 0:"):
+                pass
+        if mutable:
+            self._end_parameters()
         self._close_dheader(delimiter)
 
     def _optional(self, member: Member, value: str, *, mutable: bool) -> None:

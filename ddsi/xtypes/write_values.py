@@ -17,12 +17,15 @@ from .model import (
     WCHAR,
     ArrayType,
     BitmaskType,
+    BitsetType,
     EnumType,
     IdlType,
+    MapType,
     Primitive,
     SequenceType,
     String,
     StructType,
+    UnionType,
 )
 from .recursion import FunctionPlan
 from .source import Source
@@ -57,9 +60,11 @@ class ValueWriter:
 
     def value(self, type_: IdlType, expression: str) -> None:
         match type_:
-            case Primitive() | EnumType() | BitmaskType():
+            case Primitive() | EnumType() | BitmaskType() | BitsetType():
                 self._emitter.align(self._encoding.alignment(type_.size))
                 self._emitter.item(type_.code, type_.size, self._item_expression(type_, expression))
+            case String(wide=True):
+                self._wide_string(type_, expression)
             case String():
                 self._string(type_, expression)
             case SequenceType(element=Primitive() as element):
@@ -70,10 +75,14 @@ class ValueWriter:
                 self._primitive_array(type_, element, expression)
             case ArrayType():
                 self._array(type_, expression)
+            case MapType():
+                self._map(type_, expression)
             case StructType():
                 self._struct(type_, expression)
+            case UnionType():
+                self._union(type_, expression)
 
-    def _item_expression(self, type_: Primitive | EnumType | BitmaskType, expression: str) -> str:
+    def _item_expression(self, type_: Primitive | EnumType | BitmaskType | BitsetType, expression: str) -> str:
         if isinstance(type_, EnumType):
             name = self._local("x", expression)
             python_class = self._source.constant("Enum", type_.python_class)
@@ -104,6 +113,18 @@ class ValueWriter:
         emitter.item("I", 4, f"{count} + 1")
         emitter.part(octets, count, UNKNOWN)
         emitter.pad(1)
+
+    def _wide_string(self, type_: String, expression: str) -> None:
+        """The length counts octets, as Cyclone DDS and OpenDDS have it (Fast CDR counts units of two)."""
+        emitter = self._emitter
+        text = self._local("s", expression)
+        octets = self._local("s", f"wchars({text}, little_endian={self._encoding.little_endian})")
+        count = self._local("n", f"len({octets})")
+        condition = f"{text}.__class__ is not str or '\\0' in {text}"
+        self._refuse(condition if type_.bound is None else f"{count} > {2 * type_.bound} or {condition}")
+        emitter.align(4)
+        emitter.item("I", 4, count)
+        emitter.part(octets, count, emitter.position.residue.advance_multiple(2))
 
     def _refuse(self, condition: str) -> None:
         with self._source.block(f"if {condition}:"):
@@ -198,6 +219,21 @@ class ValueWriter:
         self._elements(type_, type_.element, value, count)
         self._close_dheader(delimiter)
 
+    def _map(self, type_: MapType, expression: str) -> None:
+        emitter = self._emitter
+        value = self._local("v", expression)
+        count = self._local("n", f"len({value})")
+        if type_.bound is not None:
+            self._refuse(f"{count} > {type_.bound}")
+        delimiter = self._open_dheader(type_)
+        emitter.align(4)
+        emitter.item("I", 4, count)
+        key, item = self._source.fresh("v"), self._source.fresh("v")
+        with emitter.loop(f"for {key}, {item} in {value}.items():", UNKNOWN):
+            self.value(type_.key, key)
+            self.value(type_.value, item)
+        self._close_dheader(delimiter)
+
     def _array(self, type_: ArrayType, expression: str) -> None:
         value = self._local("v", expression)
         self._refuse(f"{value}.__class__ in NOT_SEQUENCES")
@@ -212,7 +248,7 @@ class ValueWriter:
 
     def _elements(self, type_: IdlType, element: IdlType, value: str, count: str) -> None:
         emitter, encoding = self._emitter, self._encoding
-        if isinstance(element, (EnumType, BitmaskType)):
+        if isinstance(element, (EnumType, BitmaskType, BitsetType)):
             emitter.align(encoding.alignment(element.size))
             residue = emitter.position.residue.advance_multiple(element.size)
             octets = f"{count} * {element.size}"
@@ -241,4 +277,7 @@ class ValueWriter:
             self._emitter.resolve(length, self._emitter.position.minus(start))
 
     def _struct(self, type_: StructType, expression: str) -> None:
+        raise NotImplementedError
+
+    def _union(self, type_: UnionType, expression: str) -> None:
         raise NotImplementedError

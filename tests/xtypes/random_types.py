@@ -39,6 +39,13 @@ class Bits(enum.IntFlag):
     HIGH = 1 << 15
 
 
+@idl.bitset()
+class Fields:
+    low: Annotated[idl.uint8, idl.bits(3)]
+    signed: Annotated[idl.int8, idl.bits(3, at=5)]
+    flag: Annotated[idl.boolean, idl.bits(1)]
+
+
 @idl.struct(extensibility=idl.FINAL)
 class Point:
     x: idl.float64
@@ -73,6 +80,8 @@ SCALARS = [
 
 _TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=6)
 
+_WIDE_TEXT = st.text(st.characters(exclude_characters="\0"), max_size=6)
+
 LEAVES = [
     *SCALARS,
     Kind(str, _TEXT),
@@ -80,6 +89,9 @@ LEAVES = [
     Kind(Small, st.sampled_from(Small)),
     Kind(Tiny, st.sampled_from(Tiny)),
     Kind(Bits, st.integers(0, 0xFFFF).map(Bits)),
+    Kind(Fields, st.builds(Fields, st.integers(0, 7), st.integers(-4, 3), st.booleans())),
+    Kind(idl.wstring, _WIDE_TEXT),
+    Kind(Annotated[idl.wstring, idl.bound(12)], _WIDE_TEXT),
     Kind(Point, st.builds(Point, st.floats(allow_nan=False), _integers(16, signed=True), st.integers(0, 255))),
 ]
 
@@ -90,7 +102,13 @@ def kinds(depth: int) -> st.SearchStrategy[Kind]:
     if depth == 0:
         return leaves
     inner = kinds(depth - 1)
-    return leaves | inner.map(_sequence) | st.builds(_array, inner, st.integers(1, 3)) | structs(depth - 1)
+    collections = inner.map(_sequence) | st.builds(_array, inner, st.integers(1, 3)) | inner.map(_map)
+    return leaves | collections | structs(depth - 1) | unions(depth - 1)
+
+
+def _map(value: Kind) -> Kind:
+    annotation = Annotated[idl.map[idl.int16, value.annotation], idl.bound(4)]  # type: ignore[name-defined]
+    return Kind(annotation, st.dictionaries(_integers(16, signed=True), value.values, max_size=4), key=False)
 
 
 def _sequence(element: Kind) -> Kind:
@@ -122,6 +140,25 @@ def structs(draw: st.DrawFn, depth: int, *, keyed: bool = False) -> Kind:
     extensibility = draw(st.sampled_from(list(idl.Extensibility)))
     class_: type[Any] = idl.struct(extensibility=extensibility)(type("Random", (), {"__annotations__": annotations}))
     return Kind(class_, st.builds(class_, *values), key=False)
+
+
+@st.composite
+def unions(draw: st.DrawFn, depth: int) -> Kind:
+    """A new union by an integer or an enum with one to four cases, the last perhaps the default one."""
+    discriminator = draw(st.sampled_from((idl.int8, idl.uint64, idl.char, Small)))
+    labels: Any = "abcdefg" if discriminator is idl.char else (0, 1, 100, 3, 4, 5, 6)
+    cases = draw(st.lists(kinds(depth), min_size=1, max_size=3))
+    annotations: dict[str, Any] = {"kind": discriminator}
+    namespace: dict[str, Any] = {"kind": idl.switch, "__annotations__": annotations}
+    for number, case in enumerate(cases):
+        annotations[f"m{number}"] = case.annotation
+        is_last = number == len(cases) - 1
+        default = is_last and (discriminator is not Small or number < 2) and draw(st.booleans())
+        namespace[f"m{number}"] = idl.case(*[] if default else [labels[number]], default=default)
+    extensibility = draw(st.sampled_from(list(idl.Extensibility)))
+    class_: type[Any] = idl.union(extensibility=extensibility)(type("RandomUnion", (), namespace))
+    values = [st.builds(class_, **{f"m{number}": case.values}) for number, case in enumerate(cases)]
+    return Kind(class_, st.one_of(values), key=False)
 
 
 @st.composite

@@ -161,6 +161,68 @@ class S09:
     e: idl.sequence[S09B8]
 
 
+@idl.union(typename="s10::U", extensibility=idl.FINAL)
+class S10U:
+    discriminator: idl.int32 = idl.switch
+    i: idl.int32 = idl.case(1)
+    s: str = idl.case(2, 3)
+    d: idl.float64 = idl.case(4)
+    o: idl.octet = idl.case(default=True)
+
+
+@final("s10::Holder")
+class S10:
+    pre: idl.octet
+    u: S10U
+    post: idl.octet
+
+
+class S11Kind(enum.IntEnum):
+    KA = 0
+    KB = 1
+
+
+@idl.union(typename="s11::UE", extensibility=idl.FINAL)
+class S11UE:
+    kind: S11Kind = idl.switch
+    a: idl.int16 = idl.case(S11Kind.KA)
+    b: idl.sequence[idl.int32] = idl.case(S11Kind.KB)
+
+
+@idl.union(typename="s11::UB", extensibility=idl.FINAL)
+class S11UB:
+    discriminator: idl.boolean = idl.switch
+    t: idl.int64 = idl.case(True)
+
+
+@idl.union(typename="s11::UC", extensibility=idl.FINAL)
+class S11UC:
+    discriminator: idl.uint8 = idl.switch
+    x: idl.float32 = idl.case(7)
+    y: idl.int32 = idl.case(8)
+
+
+@final("s11::Holder")
+class S11:
+    e: S11UE
+    b: S11UB
+    c: S11UC
+
+
+@idl.union(typename="s12::U")
+class S12U:
+    discriminator: idl.int16 = idl.switch
+    i: idl.int32 = idl.case(1)
+    s: str = idl.case(2)
+
+
+@appendable("s12::Holder")
+class S12:
+    u: S12U
+    us: idl.sequence[S12U]
+    z: idl.octet
+
+
 @final("s13::Opt")
 class S13:
     a: idl.octet
@@ -464,10 +526,3 @@ TYPES: dict[str, type[Any]] = {
     name.lower(): class_ for name, class_ in list(globals().items()) if len(name) == 3 and name[0] == "S"
 }
 """``s01`` to ``s37``, without those that are not supported yet."""
-
-UNSUPPORTED = {
-    "s10_union_long": "unions",
-    "s11_union_disc": "unions",
-    "s12_union_app": "unions",
-}
-"""Vectors whose types cannot be written yet, and what they need."""
