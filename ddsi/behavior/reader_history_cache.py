@@ -173,6 +173,21 @@ class ReaderHistoryCache:
                     self._end(instance, InstanceState.NOT_ALIVE_NO_WRITERS, nobody, now)
                 self._purge(instance)
 
+    def written_again(self, change: CacheChange) -> None:
+        """A writer that was lost is back and repeats this, which was delivered before: instances live as it says."""
+        instance = self._instances.get(change.key)
+        if instance is None:
+            return
+        if change.kind is ChangeKind.ALIVE:
+            instance.writers.add(change.writer_guid)
+            if instance.state is InstanceState.NOT_ALIVE_NO_WRITERS:
+                self._revive(instance)
+        elif change.kind & StatusInfo.UNREGISTERED:
+            instance.writers.discard(change.writer_guid)
+            if not instance.writers and instance.state is _ALIVE:
+                instance.state = InstanceState.NOT_ALIVE_NO_WRITERS
+            self._purge(instance)
+
     def _add_end(self, instance: Instance, change: CacheChange, now: float) -> None:
         """Dispose, unregister, or both.  DDS 1.4 figure 2.11: disposed wins until somebody writes again."""
         if change.kind & StatusInfo.DISPOSED and instance.state is not InstanceState.NOT_ALIVE_DISPOSED:

@@ -7,6 +7,7 @@ ReaderHistoryCache of an application's reader, or whatever takes a builtin topic
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 from ..structure.cache_change import CacheChange
@@ -16,6 +17,7 @@ from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
 from .defrag import FRAGMENT_SILENCE, Defragmenter, Keep, PartialSample
+from .repeats import Position, RepeatFilter
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
 
@@ -83,6 +85,9 @@ class StatefulReader:
         self.history = history
         self.is_reliable = qos.is_reliable
         self.writers: dict[Guid, WriterProxy] = {}
+        # What to do with what a writer that was lost repeats.  None: to begin anew is right, as builtin topics do.
+        self.on_repeat: Callable[[CacheChange], None] | None = None
+        self._repeats: RepeatFilter | None = None
         self._reorder_max_samples = reorder_max_samples
         self._reorder_max_octets = reorder_max_octets
 
@@ -116,16 +121,29 @@ class StatefulReader:
         self.writers[data.guid] = proxy
         return proxy
 
-    def matched_writer_remove(self, guid: Guid, now: float) -> WriterProxy | None:
+    def matched_writer_remove(self, guid: Guid, now: float, *, may_return: bool = False) -> WriterProxy | None:
         """RTPS 2.5 §8.4.10.3.3.
 
-        What was waiting for a number that will not come any more is delivered before it goes.
+        What was waiting for a number that will not come any more is delivered before it goes.  But what keeps history
+        and ``may_return`` will send it again, in order.
         """
         proxy = self.writers.pop(guid, None)
-        if proxy is not None and proxy.is_reliable:
+        if proxy is None:
+            return None
+        may_return = may_return and self.on_repeat is not None
+        if proxy.is_reliable and not (may_return and proxy.needs_historical_data):
             proxy.reorder.skip_to(proxy.last_seq + 1)
             self._deliver(proxy, now)
+        if may_return and proxy.latest_timestamp >= 0:
+            self._remember(proxy)
         return proxy
+
+    def _remember(self, proxy: WriterProxy) -> None:
+        """From now on, what comes passes the filter first: a reader that loses nobody is spared that."""
+        if self._repeats is None:
+            assert self.on_repeat is not None
+            self.history = self._repeats = RepeatFilter(self.history, self.on_repeat)
+        self._repeats.remember(proxy.guid, Position(proxy.next_sn, proxy.latest_timestamp))
 
     # --- what writers send -------------------------------------------------------------------------------
 
@@ -141,6 +159,7 @@ class StatefulReader:
                 proxy.last_seq = number
             if self.history.add(change, now):
                 reorder.next_sn = number + 1
+                proxy.latest_timestamp = change.source_timestamp
                 if not proxy.is_reliable:
                     return 0
                 if proxy.schedule.due != math.inf:
@@ -167,6 +186,7 @@ class StatefulReader:
         proxy.reorder.head()
         proxy.last_seq = number
         proxy.reorder.next_sn = number + 1
+        proxy.latest_timestamp = change.source_timestamp
         self.history.add(change, now)
         return 0 if is_first or proxy.uses_filter else lost
 
@@ -220,6 +240,7 @@ class StatefulReader:
         while (change := proxy.reorder.head()) is not None:
             if not self.history.add(change, now):
                 break
+            proxy.latest_timestamp = change.source_timestamp
             proxy.reorder.pop_head()
         return proxy.next_sn != before
 

@@ -46,6 +46,7 @@ class WriterProxy:
         "is_local",
         "is_reliable",
         "last_seq",
+        "latest_timestamp",
         "liveliness_due",
         "locators",
         "needs_historical_data",
@@ -77,6 +78,7 @@ class WriterProxy:
         self.reorder = ReorderBuffer(max_samples=max_samples, max_octets=max_octets)
         self.schedule = AckNackSchedule()
         self.last_seq = 0
+        self.latest_timestamp = -1  # source timestamp of what was delivered last; -1: nothing was
         self.historical_sn = -1  # what the first HEARTBEAT said is there; -1: none came yet
         # HEARTBEATs one after the other that do not know what was already delivered; best effort: samples below it.
         self.contradictions = 0

@@ -267,7 +267,8 @@ class DiscoveryAgent:
         proxy = engine.participants.get(guid[:12])
         if proxy is None:
             return
-        self.endpoints_lost(proxy, LossReason.PARTICIPANT_LOST, now)
+        is_silent = reason is LossReason.LEASE_EXPIRED
+        self.endpoints_lost(proxy, reason if is_silent else LossReason.PARTICIPANT_LOST, now)
         engine.builtin.participant_lost(proxy, now)
         del engine.participants[proxy.prefix]
         engine.alarms.no_lease(proxy)

@@ -245,7 +245,7 @@ class Matchmaker:
     def unmatch_writer(self, reader: LocalReader, guid: Guid, reason: LossReason, now: float) -> None:
         engine = self._engine
         proxy = reader.behavior.writers.get(guid)
-        self.detach_writer(reader, guid, now)
+        self.detach_writer(reader, guid, now, may_return=reason is LossReason.LEASE_EXPIRED)
         engine.hooks.unmatch(reader.guid, guid)
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
@@ -256,10 +256,10 @@ class Matchmaker:
             reader.guid, reader.liveliness_changed(guid, alive=-1 if alive else 0, not_alive=0 if alive else -1)
         )
 
-    def detach_writer(self, reader: LocalReader, guid: Guid, now: float) -> None:
+    def detach_writer(self, reader: LocalReader, guid: Guid, now: float, *, may_return: bool = False) -> None:
         """Undo :meth:`attach_writer`; fragments that were meant for this reader alone go with it."""
         engine = self._engine
-        proxy = reader.behavior.matched_writer_remove(guid, now)
+        proxy = reader.behavior.matched_writer_remove(guid, now, may_return=may_return)
         engine.forget_proxy(reader.guid, guid)
         remote = engine.remote_writers.get(guid)
         if remote is None or proxy is None:

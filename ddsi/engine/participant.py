@@ -322,6 +322,7 @@ class Participant:
         )
         reader = self.add_reader(data, history, keys)
         reader.behavior.history = self.recorder.delivering(guid, history)
+        reader.behavior.on_repeat = history.written_again
         reader.protection = protection
         reader.uses_filter = uses_filter
         self._readers_by_topic.setdefault(topic_name, {})[guid] = reader

@@ -99,6 +99,7 @@ class LossReason(StrEnum):
     GOODBYE = "goodbye"
     """It said so: dispose or unregister on the discovery topic."""
     LEASE_EXPIRED = "lease_expired"
+    """It, or its participant, was not heard for the time that it promised to be.  It may return."""
     PARTICIPANT_LOST = "participant_lost"
     """The endpoint went with its participant."""
     RESTARTED = "restarted"

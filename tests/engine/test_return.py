@@ -1,0 +1,120 @@
+"""A writer that was lost and is back: what it repeats is not delivered twice, and what it holds is not lost."""
+
+from __future__ import annotations
+
+import pytest
+
+from ddsi.simulation import Domain, LinkConditions, Node
+from ddsi.structure.qos import Qos
+from ddsi.structure.qos_policies import KeepAll, KeepLast, Reliable, TransientLocal, Volatile
+from ddsi.structure.sample_info import InstanceState
+
+LATE = Qos(reliability=Reliable(), history=KeepAll(), durability=TransientLocal())
+LEASE = 20.0
+
+
+def pair(qos: Qos = LATE, *, takes: bool = True) -> tuple[Domain, Node, Node]:
+    domain = Domain()
+    a, b = domain.node(), domain.node()
+    a.writer("Square", qos)
+    b.reader("Square", qos, takes=takes)
+    assert domain.run_until(domain.all_matched, 5)
+    return domain, a, b
+
+
+def numbers(a: Node, b: Node) -> list[int]:
+    """Everything that the reader was ever given, in the order in which it was given."""
+    return [number for session in b.readers[0].sessions[a.writers[0].guid] for number in session.numbers]
+
+
+def lose(domain: Domain, a: Node, b: Node, *, one_way: bool) -> None:
+    """The reader's side forgets the writer's; one way, the writer's side goes on hearing the reader's."""
+    if one_way:
+        domain.network.set_link(a.host, b.host, LinkConditions(loss=1.0))
+    else:
+        domain.network.partition([a.host], [b.host])
+    domain.run(LEASE + 5)
+    assert a.guid.prefix not in b.engine.participants
+    assert (b.guid.prefix in a.engine.participants) is one_way
+
+
+def heal(domain: Domain, a: Node, b: Node) -> None:
+    domain.network.heal()
+    domain.network.set_link(a.host, b.host, LinkConditions())
+    assert domain.run_until(domain.all_matched, 10)
+    domain.run(2)
+
+
+@pytest.mark.parametrize("one_way", [True, False])
+def test_history_that_was_delivered_is_not_delivered_again(one_way: bool) -> None:
+    domain, a, b = pair()
+    writer = a.writers[0]
+    for _ in range(5):
+        writer.write()
+    domain.run(1)
+    lose(domain, a, b, one_way=one_way)
+    for _ in range(3):
+        writer.write()
+    heal(domain, a, b)
+    writer.write()
+    domain.run(1)
+    assert numbers(a, b) == [1, 2, 3, 4, 5, 6, 7, 8, 9]
+
+
+@pytest.mark.parametrize("one_way", [True, False])
+def test_what_waited_for_a_lost_number_comes_in_order_when_that_does(one_way: bool) -> None:
+    """3 is lost and 4 is here when the cable is pulled: 4 is not delivered before 3, and neither twice."""
+    domain, a, b = pair()
+    writer = a.writers[0]
+    for _ in range(2):
+        writer.write()
+    domain.run(1)
+    domain.network.set_link(a.host, b.host, LinkConditions(loss=1.0))
+    writer.write()
+    domain.run(0.001)
+    domain.network.set_link(a.host, b.host, LinkConditions())
+    writer.write()
+    domain.run(0.0009)  # 4 arrives, and there is no time to ask for 3
+    lose(domain, a, b, one_way=one_way)
+    heal(domain, a, b)
+    assert numbers(a, b) == [1, 2, 3, 4]
+
+
+def test_one_that_is_lost_again_and_again_repeats_nothing() -> None:
+    domain, a, b = pair()
+    for _ in range(4):
+        a.writers[0].write()
+        domain.run(1)
+        lose(domain, a, b, one_way=True)
+        heal(domain, a, b)
+    assert numbers(a, b) == [1, 2, 3, 4]
+
+
+def test_of_volatile_data_only_what_comes_after_the_return_is_promised() -> None:
+    domain, a, b = pair(LATE | Qos(durability=Volatile()))
+    writer = a.writers[0]
+    writer.write()
+    domain.run(1)
+    lose(domain, a, b, one_way=False)
+    writer.write()
+    heal(domain, a, b)
+    writer.write()
+    domain.run(1)
+    assert numbers(a, b) == [1, 3]
+
+
+def test_an_instance_lives_again_with_its_writer() -> None:
+    """Its end was told; that its writer is back is told by its state, without the same sample once more."""
+    domain, a, b = pair(LATE | Qos(history=KeepLast(1)), takes=False)
+    reader = b.readers[0]
+    a.writers[0].write()
+    domain.run(1)
+    ((_, change),) = reader.take()
+    lose(domain, a, b, one_way=True)
+    instance = reader.history.instances[change.key]
+    states = [instance.state]
+    heal(domain, a, b)
+    states.append(instance.state)
+    assert states == [InstanceState.NOT_ALIVE_NO_WRITERS, InstanceState.ALIVE]
+    assert [info.valid_data for info, _ in reader.take()] == [False]
+    assert instance.no_writers_generation_count == 1
