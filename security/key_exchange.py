@@ -59,6 +59,11 @@ class Pair:
     handle: CryptoHandle | None
     awaits_key: bool
     is_open: bool = False
+    remote_entity: bytes = b""
+    """Its entity id."""
+
+    def __post_init__(self) -> None:
+        self.remote_entity = bytes(self.remote[12:])
 
 
 class Outbox(Protocol):

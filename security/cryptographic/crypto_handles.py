@@ -17,6 +17,7 @@ from typing import Final
 
 from ddsi.spi import Refused
 
+from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
 from .received_keys import KeyRing
 from .session_keys import ReceiverKey, SendingKey
@@ -181,10 +182,10 @@ class LocalReader(DatareaderCryptoHandle):
 class RemoteReader(DatareaderCryptoHandle):
     """A reader that ``writer`` is matched with.  ``ring``: the keys of its ACKNACKs; ``receiver_key``: for it.
 
-    ``key_ids``: under which :meth:`RemoteParticipant.index` knows it.
+    ``key_ids``: under which :meth:`RemoteParticipant.index` knows it.  ``whose``: what is told of its submessages.
     """
 
-    __slots__ = ("key_ids", "participant", "receiver_key", "relay_only", "ring", "writer")
+    __slots__ = ("key_ids", "participant", "receiver_key", "relay_only", "ring", "whose", "writer")
 
     def __init__(
         self,
@@ -201,6 +202,7 @@ class RemoteReader(DatareaderCryptoHandle):
         self.receiver_key = receiver_key
         self.relay_only = relay_only
         self.key_ids: tuple[bytes, ...] = ()
+        self.whose = SecureSubmessage(SecureSubmessageCategory.DATAREADER_SUBMESSAGE, writer, self)
 
     def wipe(self) -> None:
         _wipe(self.receiver_key)
@@ -215,10 +217,10 @@ class RemoteReader(DatareaderCryptoHandle):
 class RemoteWriter(DatawriterCryptoHandle):
     """A writer that ``reader`` is matched with.  ``ring``, ``payload_ring``: its keys; ``receiver_key``: for it.
 
-    ``key_ids``: under which :meth:`RemoteParticipant.index` knows it.
+    ``key_ids``: under which :meth:`RemoteParticipant.index` knows it.  ``whose``: what is told of its submessages.
     """
 
-    __slots__ = ("key_ids", "participant", "payload_ring", "reader", "receiver_key", "ring")
+    __slots__ = ("key_ids", "participant", "payload_ring", "reader", "receiver_key", "ring", "whose")
 
     def __init__(
         self,
@@ -235,6 +237,7 @@ class RemoteWriter(DatawriterCryptoHandle):
         self.payload_ring = payload_ring
         self.receiver_key = receiver_key
         self.key_ids: tuple[bytes, ...] = ()
+        self.whose = SecureSubmessage(SecureSubmessageCategory.DATAWRITER_SUBMESSAGE, self, reader)
 
     def wipe(self) -> None:
         _wipe(self.receiver_key, self.payload_ring)

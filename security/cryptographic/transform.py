@@ -153,9 +153,7 @@ class AesGcmGmacTransform:
             return Rejected(str(error))
         except struct.error:
             return Rejected("the octets end within the envelope")
-        if isinstance(sender, RemoteWriter):
-            return SecureSubmessage(SecureSubmessageCategory.DATAWRITER_SUBMESSAGE, sender, sender.reader)
-        return SecureSubmessage(SecureSubmessageCategory.DATAREADER_SUBMESSAGE, sender.writer, sender)
+        return sender.whose
 
     def decode_datawriter_submessage(
         self,

@@ -335,7 +335,9 @@ def test_what_stands_in_clear_behind_a_protected_message_is_left_out(name: str) 
     octets, open_it, plain = GENUINE[name]
     assert open_it(octets + TRAILER) == plain
     assert open_it(octets + vectors.HEARTBEAT) == plain
-    assert open_it(octets + octets[20:]) == plain
+    twice = open_it(octets + octets[20:])
+    # What is signed is taken to end with the last postfix of all, and then its MAC is wrong.
+    assert twice == plain if name == "message, encrypted" else isinstance(twice, Rejected)
 
 
 def test_the_header_must_name_whom_the_info_source_names() -> None:
@@ -385,14 +387,12 @@ def test_the_first_submessage_must_be_info_source(
     assert accepted or isinstance(found, Rejected)
 
 
-def test_a_message_in_a_message_is_rejected() -> None:
+def test_a_message_in_a_message_is_not_opened_twice() -> None:
     for kind in (GCM, GMAC):
         inner, outer = bytearray(), bytearray()
         assert seal_message(inner, vectors.MESSAGE, sending_key(material(kind)), []) is None
         assert seal_message(outer, bytes(inner), sending_key(material(kind)), []) is None
-        found = opener(opening.open_message, kind, origin=False)(bytes(outer))
-        # What is encrypted comes out with its inner envelope, which nobody opens a second time.
-        assert isinstance(found, Rejected) if kind is GMAC else found == inner
+        assert opener(opening.open_message, kind, origin=False)(bytes(outer)) == inner
 
 
 def test_a_signed_message_holds_protected_submessages() -> None:
