@@ -68,8 +68,10 @@ class Listener:
 
     def state(self) -> dict[str, object]:
         """Everything that a datagram may have changed."""
-        proxy = self.reader.behavior.writers[self.writer]
         assert self.reader.history is not None
+        proxy = self.reader.behavior.writers.get(self.writer)
+        if proxy is None:  # its participant began anew, as HEARTBEATs contradicted each other
+            return {"drops": dict(self.participant.drops), "sent": sent(self.participant)}
         return {
             "samples": [
                 (change.sequence_number, change.kind, bytes(change.payload), change.source_timestamp)
