@@ -10,9 +10,11 @@ from .endpoints import NodeReader, NodeWriter, ReadingSession
 from .link import GOOD_WEATHER, LinkConditions
 from .network import Network, SimulationStuck
 from .node import Node, NodeSetup
+from .vendors import VENDORS, Vendor
 
 __all__ = [
     "GOOD_WEATHER",
+    "VENDORS",
     "Dice",
     "Domain",
     "LinkConditions",
@@ -23,4 +25,5 @@ __all__ = [
     "NodeWriter",
     "ReadingSession",
     "SimulationStuck",
+    "Vendor",
 ]

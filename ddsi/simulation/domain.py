@@ -14,6 +14,7 @@ from .endpoints import NodeReader, NodeWriter
 from .link import GOOD_WEATHER, LinkConditions
 from .network import Network
 from .node import Node, NodeSetup
+from .vendors import Vendor
 
 __all__ = ["Domain"]
 
@@ -59,8 +60,10 @@ class Domain:
         clock_error: float = 0.0,
         properties: Properties | None = None,
         make_hooks: Callable[[], SecurityHooks] | None = None,
+        vendor: Vendor | None = None,
     ) -> Node:
-        """A participant, on a host of its own unless it is given the ``address`` of another's."""
+        """A participant, on a host of its own unless it is given the ``address`` of another's; ours, or one that plays
+        a ``vendor``'s."""
         number = len(self.nodes)
         address = address or f"10.0.{number // 250}.{number % 250 + 1}"
         index = self._indices.get(address, 0)
@@ -77,6 +80,7 @@ class Domain:
             clock_error=clock_error,
             properties=properties or {},
             make_hooks=make_hooks,
+            vendor=vendor,
         )
         node = Node(setup, self.network, self.dice.fork(), self._trace)
         self.nodes.append(node)

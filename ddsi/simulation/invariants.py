@@ -78,9 +78,11 @@ def _session_flaws(reader: NodeReader, writer: NodeWriter, changes: list[CacheCh
 
 def _is_same(received: CacheChange, original: CacheChange) -> bool:
     """Kind, key and octets.  A submessage is padded to a multiple of 4, so zeros may follow the payload; short keys are
-    filled up with more of them."""
+    filled up with more of them.  Some vendors send no payload with the end of an instance."""
     if (received.kind, received.key) != (original.kind, original.key):
         return False
+    if not received.payload and received.kind is not ChangeKind.ALIVE:
+        return True
     size = len(original.payload)
     if bytes(received.payload[:size]) != original.payload or any(received.payload[size:]):
         return False

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import cast
 
 from ..config import Config
 from ..engine import (
@@ -27,12 +28,13 @@ from ..structure.locator import Locator
 from ..structure.qos import Qos, reader_qos, writer_qos
 from ..structure.qos_policies import Properties
 from ..structure.status import Status
-from ..structure.vendor import OUR_VENDOR_ID
 from ..trace.events import Remark
 from ..trace.sink import TraceSink
 from .dice import Dice
 from .endpoints import SIMULATED_KEYS, BookKeeper, NodeReader, NodeWriter
 from .network import Network, Port
+from .vendor_hooks import VendorHooks
+from .vendors import Vendor
 
 __all__ = ["Node", "NodeSetup"]
 
@@ -43,7 +45,8 @@ _WALL_CLOCK_AT_START = 1_700_000_000 * 1_000_000_000  # nanoseconds since 1970
 class NodeSetup:
     """Where a node stands and how it announces itself.  ``address``: its host, IPv4.  ``peers``: hosts to call by
     unicast.  ``clock_error``: seconds that its wall clock is wrong by.  ``properties``: those of its QoS; security is
-    loaded by them, as in a participant with sockets, unless ``make_hooks`` makes other hooks."""
+    loaded by them, as in a participant with sockets, unless ``make_hooks`` makes other hooks.
+    ``vendor``: whose stack it plays."""
 
     name: str
     address: str
@@ -56,6 +59,7 @@ class NodeSetup:
     clock_error: float = 0.0
     properties: Properties = field(default_factory=dict)
     make_hooks: Callable[[], SecurityHooks] | None = None
+    vendor: Vendor | None = None
 
     def meets(self, other: NodeSetup) -> bool:
         """Are both in one domain, under one tag?"""
@@ -77,6 +81,7 @@ class Node:
         self.discovery_changes = 0
         self.timeout_count = 0
         self.is_up = False
+        self.played: VendorHooks | None = None  # the vendor's habits, where it plays one
         self._dice = dice
         self._trace = trace
         self._wake_at = math.inf
@@ -104,17 +109,18 @@ class Node:
         """Come up, under a GUID that nobody had before, or under a given one."""
         assert not self.is_up
         setup = self.setup
+        config = setup.config if setup.vendor is None else setup.vendor.config(setup.config)
         ports, domain_id, index = setup.config.ports, setup.domain_id, setup.participant_index
         metatraffic = Locator.udp_v4(setup.address, ports.metatraffic_unicast(domain_id, index))
         user = Locator.udp_v4(setup.address, ports.user_unicast(domain_id, index))
         group = Locator.udp_v4(setup.config.multicast_address, ports.metatraffic_multicast(domain_id))
         groups = (group,) if setup.multicast else ()
-        prefix = prefix or GuidPrefix(OUR_VENDOR_ID + self._dice.octets(10))
+        prefix = prefix or GuidPrefix(config.vendor_id + self._dice.octets(10))
         self.engine = engine = Participant(
             ParticipantSetup(
                 domain_id=domain_id,
                 guid_prefix=prefix,
-                config=setup.config,
+                config=config,
                 metatraffic_unicast=(metatraffic,),
                 metatraffic_multicast=groups,
                 default_unicast=(user,),
@@ -128,6 +134,8 @@ class Node:
             hooks=self._make_hooks(),
             trace=self._trace,
         )
+        if self.played is not None:
+            self.played.joined(engine)
         engine.recorder = self._books = BookKeeper(engine, self._trace)
         prefix = engine.guid.prefix  # security may have adjusted it
         self.port = Port(metatraffic, prefix, self._receive)
@@ -247,7 +255,8 @@ class Node:
                 self.engine.samples_taken(reader.local, self.now)
 
     def _receive(self, octets: bytes, source: Locator) -> None:
-        self.engine.receive_datagram(octets, source, self.now)
+        heard = octets if self.played is None else self.played.understood(octets)
+        self.engine.receive_datagram(heard, source, self.now)
         self.pump()
 
     def _arm(self) -> None:
@@ -271,9 +280,15 @@ class Node:
         return _WALL_CLOCK_AT_START + int((self.now + self.setup.clock_error) * 1e9)
 
     def _make_hooks(self) -> SecurityHooks:
-        if self.setup.make_hooks is not None:
-            return self.setup.make_hooks()
-        return load_hooks(self.setup.properties, entropy=self._dice.octets, wall_clock=self._wall_clock)
+        setup = self.setup
+        if setup.make_hooks is not None:
+            hooks = setup.make_hooks()
+        else:
+            hooks = load_hooks(setup.properties, entropy=self._dice.octets, wall_clock=self._wall_clock)
+        if setup.vendor is None:
+            return hooks
+        self.played = VendorHooks(hooks, setup.vendor.quirks)
+        return cast(SecurityHooks, self.played)  # what it does not name itself, it passes on
 
     def _peer_locators(self) -> Iterable[Locator]:
         """Each peer's host at every index that a participant there may have taken."""

@@ -35,6 +35,7 @@ from .domain import Domain
 from .endpoints import NodeReader, NodeWriter
 from .link import GOOD_WEATHER, LinkConditions
 from .node import Node
+from .vendors import Vendor
 
 __all__ = ["Failure", "Report", "Scenario"]
 
@@ -216,12 +217,19 @@ class Scenario:
         for step in self.steps:
             yield f"- {step}"
 
-    def run(self, trace: TraceSink | None = None, *, properties: Sequence[Properties] = ({},)) -> Report:
+    def run(
+        self,
+        trace: TraceSink | None = None,
+        *,
+        properties: Sequence[Properties] = ({},),
+        vendors: Sequence[Vendor | None] = (None,),
+    ) -> Report:
         """Live through it and check every invariant.  Raises Failure.
 
-        The participants get ``properties`` by turns; those that configure security make it a secured domain.
+        The participants get ``properties`` by turns; those that configure security make it a secured domain.  By turns
+        they play the ``vendors``, too; None for ours.
         """
-        return _Run(self, trace, properties).run()
+        return _Run(self, trace, properties, vendors).run()
 
 
 # --- making a plan -------------------------------------------------------------------------------------------------
@@ -341,14 +349,20 @@ class _Planner:
 
 
 class _Run:
-    def __init__(self, scenario: Scenario, trace: TraceSink | None, properties: Sequence[Properties]) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        trace: TraceSink | None,
+        properties: Sequence[Properties],
+        vendors: Sequence[Vendor | None],
+    ) -> None:
         self._scenario = scenario
         self._dice = Dice(scenario.seed ^ 0x5EED)
         self._domain = Domain(scenario.seed, conditions=scenario.conditions, trace=trace)
         self._plans: dict[int, list[EndpointPlan]] = {}
         self._introduction_s = _SECURED_INTRODUCTION_S if any(properties) else _INTRODUCTION_S
         hosts = tuple(dict.fromkeys(scenario.hosts))
-        for host, config, own in zip(scenario.hosts, scenario.configs, cycle(properties)):
+        for host, config, own, vendor in zip(scenario.hosts, scenario.configs, cycle(properties), cycle(vendors)):
             self._domain.node(
                 address=host,
                 config=config,
@@ -356,6 +370,7 @@ class _Run:
                 peers=() if scenario.multicast else hosts,
                 max_message_octets=scenario.max_message_octets,
                 properties=own,
+                vendor=vendor,
             )
 
     def run(self) -> Report:

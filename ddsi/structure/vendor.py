@@ -43,6 +43,8 @@ FAST_DDS: VendorId = b"\x01\x0f"
 RTI: VendorId = b"\x01\x01"
 RTI_MICRO: VendorId = b"\x01\x0a"
 OPENDDS: VendorId = b"\x01\x03"
+RUST_DDS: VendorId = b"\x01\x12"
+DUST_DDS: VendorId = b"\x01\x14"
 TWINOAKS: VendorId = b"\x01\x06"
 
 

@@ -1,0 +1,296 @@
+"""Quirks: habits of other vendors' stacks, to be played by a participant of a simulation.
+
+Those stacks cannot be installed everywhere, and where they can, they do not show each habit on demand.  A quirk stands
+at the seam of the engine (:class:`ddsi.spi.SecurityHooks`), where every submessage passes before it is protected and
+every message before it leaves, and changes there what our own engine would say, hear or leave out.  So it works with
+security and without, and knows nothing of keys.  Which vendor has which: :mod:`.vendors`; how one is played:
+:mod:`.vendor_hooks`.
+
+Not here: timing, QoS defaults and types of other vendors, and what only their handshake does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..messages.acknack import AckNack
+from ..messages.data import Data
+from ..messages.data_frag import DataFrag
+from ..messages.gap import Gap
+from ..messages.header import HEADER_LENGTH
+from ..messages.heartbeat import Heartbeat
+from ..messages.raw_submessage import LITTLE_ENDIAN, SubmessageKind, iterate_submessages
+from ..messages.submessages import Submessage
+from ..serialization.parameter_id import ParameterId
+from ..spi import HookEffect, SecurityHooks, SendMessage
+from ..structure import builtin_entity_ids as ids
+from ..structure.guid import GUID_UNKNOWN, Guid
+from ..structure.sequence_number import NumberSet
+from ..trace.generic_message import generic_message_outline
+
+if TYPE_CHECKING:
+    from ..engine import Participant
+
+__all__ = [
+    "AckNackFromZero",
+    "BigEndianEnvelopes",
+    "BigEndianSubmessages",
+    "DisposeByKeyHash",
+    "DropsCountZero",
+    "GapWhenAsked",
+    "HeartbeatForAll",
+    "KeysForEverybody",
+    "LengthlessPostfix",
+    "NoParticipantTokens",
+    "NonStandardPayload",
+    "OpensAfterJoining",
+    "PlainTopicsInClear",
+    "Quirk",
+    "RefusesAckNackFromZero",
+    "SealsBeforeCutting",
+    "VendorSubmessageBehind",
+]
+
+_ENVELOPE = frozenset({SubmessageKind.SEC_PREFIX, SubmessageKind.SEC_BODY, SubmessageKind.SEC_POSTFIX})
+_MESSAGE_ENVELOPE = frozenset({SubmessageKind.SRTPS_PREFIX, SubmessageKind.SEC_BODY, SubmessageKind.SRTPS_POSTFIX})
+_POSTFIXES = frozenset({SubmessageKind.SEC_POSTFIX, SubmessageKind.SRTPS_POSTFIX})
+_LEAST_PAYLOAD_OVERHEAD = 40  # CryptoHeader and CryptoFooter (DDS-Security 1.1 §9.5.2.3, §9.5.2.5); padding: 3 at most
+_VENDOR_SUBMESSAGE = b"\x80\x01\x3c\x00" + bytes(60)
+_PLAIN_READERS_AND_WRITERS = frozenset(
+    {
+        *(ids.SEDP_PUBLICATIONS_READER, ids.SEDP_PUBLICATIONS_WRITER),
+        *(ids.SEDP_SUBSCRIPTIONS_READER, ids.SEDP_SUBSCRIPTIONS_WRITER),
+        *(ids.PARTICIPANT_MESSAGE_READER, ids.PARTICIPANT_MESSAGE_WRITER),
+    }
+)
+_BYTE_ORDER_FREE = frozenset({ParameterId.KEY_HASH, ParameterId.STATUS_INFO})
+
+
+class Quirk:
+    """One habit of one participant.  Each method is a moment; what a quirk does not override stays as it is.
+
+    ``hooks``: those of the participant, without any quirk.  ``engine`` is there when the first moment comes.
+    """
+
+    little_endian = True
+    seals_before_cutting = False
+    engine: Participant
+
+    def __init__(self, hooks: SecurityHooks) -> None:
+        self.hooks = hooks
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        """A submessage before it is protected; None leaves it unsaid."""
+        return submessage
+
+    def bares(self, receiver: Guid) -> bool:
+        """Does a message to this endpoint leave without the protection of messages, where there is one?"""
+        return False
+
+    def wrap(self, envelope: bytes) -> bytes:
+        """What became of it: SEC_PREFIX to SEC_POSTFIX.  Only asked where submessages are protected."""
+        return envelope
+
+    def finish(self, message: bytes) -> bytes:
+        """A whole message, protected or not, with its header."""
+        return message
+
+    def post(self, effect: HookEffect) -> HookEffect | None:
+        """What security wants done: a handshake message, a token.  None leaves it undone."""
+        return effect
+
+    def hear(self, submessage: Submessage) -> bool:
+        """Does this vendor understand a submessage, now that it is in clear?"""
+        return True
+
+
+# --- repair --------------------------------------------------------------------------------------------------------
+
+
+class AckNackFromZero(Quirk):
+    """ "What have you?" is an ACKNACK with base 0, where the specification has 1 (RTPS 2.5 §8.3.8.1.3)."""
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        if isinstance(submessage, AckNack) and submessage.reader_sn_state == NumberSet(1):
+            return replace(submessage, reader_sn_state=NumberSet(0))
+        return submessage
+
+
+class HeartbeatForAll(Quirk):
+    """A writer whose samples have destinations tells each reader of all its numbers, others' too.
+
+    Who is told asks for them, and gets a GAP.
+    """
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        writer = self.engine.local_writers.get(sender)
+        if not isinstance(submessage, Heartbeat) or writer is None or len(receivers) != 1:
+            return submessage
+        proxy = writer.behavior.readers.get(receivers[0])
+        last_sn = writer.behavior.next_unsent_sn - 1
+        if proxy is None or submessage.last_sn >= last_sn:
+            return submessage
+        proxy.lst_seq = last_sn  # so far it may be asked from now on, and will answer
+        return replace(submessage, last_sn=last_sn, final=False)
+
+
+class GapWhenAsked(Quirk):
+    """The GAP that ought to go with a sample stays away; an ACKNACK has to ask for it."""
+
+    def __init__(self, hooks: SecurityHooks) -> None:
+        super().__init__(hooks)
+        self._kept_back: set[tuple[Guid, tuple[Guid, ...], int]] = set()
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        if isinstance(submessage, Gap):
+            gap = (sender, tuple(receivers), submessage.gap_start)
+            if gap not in self._kept_back:
+                self._kept_back.add(gap)
+                return None
+        return submessage
+
+
+class DisposeByKeyHash(Quirk):
+    """The end of an instance names it by its key hash alone, without a payload (RTPS 2.5 §9.6.4.8)."""
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        if not isinstance(submessage, Data) or not submessage.is_key:
+            return submessage
+        assert submessage.inline_qos is not None
+        assert submessage.inline_qos.get(ParameterId.KEY_HASH) is not None, "we always send it"
+        return replace(submessage, serialized_payload=b"", is_key=False)
+
+
+class RefusesAckNackFromZero(Quirk):
+    """Base 0 is malformed, unless one of the vendors sent it that are known for it."""
+
+    def hear(self, submessage: Submessage) -> bool:
+        return not (isinstance(submessage, AckNack) and submessage.reader_sn_state.base == 0)
+
+
+class DropsCountZero(Quirk):
+    """HEARTBEAT and ACKNACK are compared with a count that begins at 0, so those that have it are never new."""
+
+    def hear(self, submessage: Submessage) -> bool:
+        return not (isinstance(submessage, AckNack | Heartbeat) and submessage.count == 0)
+
+
+class BigEndianSubmessages(Quirk):
+    """As a host of that byte order sends them; payloads keep the order that their encapsulation names."""
+
+    little_endian = False
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        if not isinstance(submessage, Data | DataFrag) or submessage.inline_qos is None:
+            return submessage
+        swapped = type(submessage.inline_qos)(submessage.inline_qos, little_endian=False)
+        assert _BYTE_ORDER_FREE.issuperset(parameter.pid for parameter in swapped), "others would have to be swapped"
+        return replace(submessage, inline_qos=swapped)
+
+
+class VendorSubmessageBehind(Quirk):
+    """Every message ends with a submessage of the vendor's own, in clear even where the message is protected."""
+
+    def finish(self, message: bytes) -> bytes:
+        *_, last = iterate_submessages(message)
+        size = len(last.body).to_bytes(2, "little" if last.little_endian else "big")
+        closed = message[: last.offset + 2] + size + message[last.offset + 4 :]  # it is not the last any more
+        return closed + _VENDOR_SUBMESSAGE
+
+
+# --- protection ------------------------------------------------------------------------------------------------------
+
+
+class SealsBeforeCutting(Quirk):
+    """A sample is protected whole and cut into fragments then; §8.5.1.9.1 means each run to be protected by itself."""
+
+    seals_before_cutting = True
+
+
+class OpensAfterJoining(Quirk):
+    """The receiving side of the same: runs that were protected by themselves are joined, and cannot be opened."""
+
+    def hear(self, submessage: Submessage) -> bool:
+        if not isinstance(submessage, DataFrag):
+            return True
+        return len(submessage.serialized_payload) < submessage.run_length + _LEAST_PAYLOAD_OVERHEAD
+
+
+class NonStandardPayload(Quirk):
+    """A payload that is protected is called non-standard (flag N), as it begins with no encapsulation header."""
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        if not isinstance(submessage, Data | DataFrag) or not submessage.serialized_payload:
+            return submessage
+        is_protected = self.hooks.overhead(sender, receivers).payload > 0
+        return replace(submessage, non_standard_payload=True) if is_protected else submessage
+
+
+class BigEndianEnvelopes(Quirk):
+    """The headers of SEC_ and SRTPS_ submessages are big-endian, whatever is in them (RTPS 2.5 §9.4.5.1.2)."""
+
+    def wrap(self, envelope: bytes) -> bytes:
+        return _big_endian(envelope, 0, _ENVELOPE)
+
+    def finish(self, message: bytes) -> bytes:
+        if len(message) > HEADER_LENGTH and message[HEADER_LENGTH] == SubmessageKind.SRTPS_PREFIX:
+            return _big_endian(message, HEADER_LENGTH, _MESSAGE_ENVELOPE)
+        return message
+
+
+class LengthlessPostfix(Quirk):
+    """A postfix that ends the message has length 0, "to the end of the message" (RTPS 2.5 §9.4.5.1.3)."""
+
+    def finish(self, message: bytes) -> bytes:
+        *_, last = iterate_submessages(message)
+        if last.kind not in _POSTFIXES:
+            return message
+        return message[: last.offset + 2] + bytes(2) + message[last.offset + 4 :]
+
+
+class PlainTopicsInClear(Quirk):
+    """Discovery and liveliness on the plain builtin topics leave unprotected, though messages are to be protected."""
+
+    def bares(self, receiver: Guid) -> bool:
+        return receiver.entity_id in _PLAIN_READERS_AND_WRITERS
+
+
+class KeysForEverybody(Quirk):
+    """Each message of the volatile topic goes to all participants, under the key shared with each."""
+
+    def post(self, effect: HookEffect) -> HookEffect | None:
+        if not isinstance(effect, SendMessage) or effect.writer != ids.PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER:
+            return effect
+        change = copy(effect.change)
+        change.destination = GUID_UNKNOWN  # what it says in its payload stays
+        return replace(effect, change=change)
+
+
+class NoParticipantTokens(Quirk):
+    """Where messages are not protected, no key of the participant is sent; others send one of kind NONE (§8.8.9)."""
+
+    def post(self, effect: HookEffect) -> HookEffect | None:
+        if not isinstance(effect, SendMessage):
+            return effect
+        outline = generic_message_outline(effect.change.payload)
+        is_token = outline is not None and outline.kind == "participant-tokens"
+        sender = effect.change.writer_guid.participant
+        return None if is_token and not self.hooks.overhead(sender, ()).message else effect
+
+
+def _big_endian(octets: bytes, start: int, kinds: frozenset[SubmessageKind]) -> bytes:
+    """Swap the lengths in the headers of these kinds.  What a signature covers stands between them and stays."""
+    changed = bytearray(octets)
+    previous: int | None = None
+    for raw in iterate_submessages(octets, start=start):
+        # Within a signed message there are envelopes of submessages, and their SEC_BODY is signed with all the rest.
+        is_body = raw.kind == SubmessageKind.SEC_BODY
+        if raw.kind in kinds and raw.little_endian and (not is_body or previous in kinds):
+            at = raw.offset
+            changed[at + 1] &= ~LITTLE_ENDIAN
+            changed[at + 2 : at + 4] = octets[at + 3], octets[at + 2]
+        previous = raw.kind
+    return bytes(changed)

@@ -1,0 +1,137 @@
+"""VendorHooks: the hooks of a participant that plays another vendor's; its quirks change what passes them.
+
+A decorator of :class:`ddsi.spi.SecurityHooks`: those of DDS Security or the plain ones.  What it does not name itself
+goes straight to them.  It protects nothing and opens nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..messages.header import HEADER_LENGTH
+from ..messages.raw_submessage import SubmessageKind, iterate_submessages
+from ..messages.submessages import (
+    AckNack,
+    Data,
+    DataFrag,
+    Gap,
+    Heartbeat,
+    HeartbeatFrag,
+    NackFrag,
+    Submessage,
+    decode_submessage,
+)
+from ..spi import HookEffect, Octets, Outcome, Parts, Rejected, SecurityHooks
+from ..structure.errors import MalformedMessage
+from ..structure.guid import Guid, GuidPrefix
+from .quirks import Quirk
+
+if TYPE_CHECKING:
+    from ..engine import Participant
+
+__all__ = ["VendorHooks"]
+
+_EntitySubmessage = AckNack | Data | DataFrag | Gap | Heartbeat | HeartbeatFrag | NackFrag
+
+
+class VendorHooks:
+    """Stands for ``hooks``.  The quirks act in their order.  ``acts`` counts what each has changed, or not heard."""
+
+    def __init__(self, hooks: SecurityHooks, quirks: Iterable[type[Quirk]]) -> None:
+        self.acts: Counter[type[Quirk]] = Counter()
+        self._hooks = hooks
+        self._quirks = [quirk(hooks) for quirk in quirks]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._hooks, name)
+
+    def joined(self, engine: Participant) -> None:
+        """The participant is there whose hooks these are."""
+        for quirk in self._quirks:
+            quirk.engine = engine
+
+    def _acts(self, quirk: Quirk, acts: bool) -> bool:
+        self.acts[type(quirk)] += acts
+        return acts
+
+    # --- outwards ----------------------------------------------------------------------------------------
+
+    def drain_effects(self) -> Sequence[HookEffect]:
+        return [posted for effect in self._hooks.drain_effects() if (posted := self._post(effect)) is not None]
+
+    def _post(self, effect: HookEffect) -> HookEffect | None:
+        for quirk in self._quirks:
+            posted = quirk.post(effect)
+            self._acts(quirk, posted is not effect)
+            if posted is None:
+                return None
+            effect = posted
+        return effect
+
+    def opens_after_joining(self, reader: Guid) -> bool:
+        seals = [self._acts(quirk, quirk.seals_before_cutting) for quirk in self._quirks]
+        return any(seals) or self._hooks.opens_after_joining(reader)
+
+    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+        said = self._said(sender, receivers, b"".join(submessage))
+        encoded = b"".join(self._hooks.encode_submessage(sender, receivers, (said,))) if said else b""
+        if encoded[:1] == bytes((SubmessageKind.SEC_PREFIX,)):
+            for quirk in self._quirks:
+                wrapped = quirk.wrap(encoded)
+                self._acts(quirk, wrapped is not encoded)
+                encoded = wrapped
+        return (encoded,) if encoded else ()
+
+    def _said(self, sender: Guid, receivers: Sequence[Guid], octets: bytes) -> bytes:
+        """What is said instead of this submessage; nothing if it is left unsaid."""
+        (raw,) = iterate_submessages(octets, start=0)
+        submessage = decode_submessage(raw)
+        for quirk in self._quirks:
+            said = quirk.say(sender, receivers, submessage)
+            self._acts(quirk, said is not submessage or not quirk.little_endian)
+            if said is None:
+                return b""
+            submessage = said
+        assert isinstance(submessage, _EntitySubmessage), f"{submessage} is of no endpoint"
+        return submessage.encode(little_endian=all(quirk.little_endian for quirk in self._quirks))
+
+    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        bare = [self._acts(quirk, quirk.bares(receivers[0])) for quirk in self._quirks if receivers]
+        encoded = b"".join(message if any(bare) else self._hooks.encode_message(receivers, message))
+        if not encoded:
+            return ()
+        for quirk in self._quirks:
+            finished = quirk.finish(encoded)
+            self._acts(quirk, finished is not encoded)
+            encoded = finished
+        return (encoded,)
+
+    # --- inwards -----------------------------------------------------------------------------------------
+
+    def understood(self, message: Octets) -> Octets:
+        """A message as it came, without the submessages that this vendor does not understand."""
+        try:
+            kept = [
+                bytes(message[raw.offset : raw.end])
+                for raw in iterate_submessages(message)
+                if self._hears(decode_submessage(raw))
+            ]
+        except MalformedMessage:
+            return message  # that is for the engine to find out
+        return bytes(message[:HEADER_LENGTH]) + b"".join(kept)
+
+    def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
+        decoded = self._hooks.decode_message(message, GuidPrefix(source))
+        return decoded if isinstance(decoded, Outcome) else self.understood(decoded)
+
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
+        decoded = self._hooks.decode_submessage(protected, GuidPrefix(source))
+        if isinstance(decoded, Outcome):
+            return decoded
+        (raw,) = iterate_submessages(decoded, start=0)
+        return decoded if self._hears(decode_submessage(raw)) else Rejected("this vendor does not understand it")
+
+    def _hears(self, submessage: Submessage) -> bool:
+        return not any(self._acts(quirk, not quirk.hear(submessage)) for quirk in self._quirks)
