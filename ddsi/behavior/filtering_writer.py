@@ -18,6 +18,7 @@ from itertools import takewhile
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.qos import EndpointQos
+from .dropping import WhenDropped, drop_silently
 from .filtered import gap_before
 from .reader_proxy import ReaderProxy
 from .stateful_writer import StatefulWriter
@@ -32,9 +33,21 @@ MAX_CHANGES_PER_DESTINATION = 256
 class FilteringWriter(StatefulWriter):
     """The history is KEEP_ALL, as a change for one reader must not push out another's."""
 
-    def __init__(self, guid: Guid, qos: EndpointQos, *, fragment_octets: int, unacknowledged_octets_max: int) -> None:
+    def __init__(
+        self,
+        guid: Guid,
+        qos: EndpointQos,
+        *,
+        fragment_octets: int,
+        unacknowledged_octets_max: int,
+        on_dropped: WhenDropped = drop_silently,
+    ) -> None:
         super().__init__(
-            guid, qos, fragment_octets=fragment_octets, unacknowledged_octets_max=unacknowledged_octets_max
+            guid,
+            qos,
+            fragment_octets=fragment_octets,
+            unacknowledged_octets_max=unacknowledged_octets_max,
+            on_dropped=on_dropped,
         )
         # The numbers in the cache by destination, ascending.  A dict serves as an ordered set.
         self._held: dict[Guid, dict[int, None]] = {}

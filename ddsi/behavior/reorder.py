@@ -43,6 +43,10 @@ class ReorderBuffer:
         """Is anything here that the fast path must not overtake?"""
         return bool(self._changes or self._range_starts)
 
+    def __contains__(self, number: object) -> bool:
+        """Is this number's change held, or is it irrelevant?"""
+        return number in self._changes or (isinstance(number, int) and self.is_irrelevant(number))
+
     @property
     def octets(self) -> int:
         return self._octets
@@ -53,7 +57,7 @@ class ReorderBuffer:
         Its number must not lie below ``next_sn``.
         """
         number = change.sequence_number
-        if number in self._changes or self.is_irrelevant(number):
+        if number in self:
             return False
         size = len(change.payload)
         if number != self.next_sn and (

@@ -16,7 +16,9 @@ from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
+from ..trace.reasons import DropReason
 from .defrag import FRAGMENT_SILENCE, Defragmenter, Keep, PartialSample
+from .dropping import WhenDropped, drop_silently
 from .repeats import Position, RepeatFilter
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
@@ -79,7 +81,9 @@ class StatefulReader:
         *,
         reorder_max_samples: int,
         reorder_max_octets: int,
+        on_dropped: WhenDropped = drop_silently,
     ) -> None:
+        """``on_dropped`` is told what is not acted upon: why, whose it was, its sequence number or count."""
         self.guid = guid
         self.qos = qos
         self.history = history
@@ -90,6 +94,7 @@ class StatefulReader:
         self._repeats: RepeatFilter | None = None
         self._reorder_max_samples = reorder_max_samples
         self._reorder_max_octets = reorder_max_octets
+        self._on_dropped = on_dropped
 
     def __repr__(self) -> str:
         return f"<StatefulReader {self.guid}, {len(self.writers)} writers>"
@@ -179,6 +184,7 @@ class StatefulReader:
         """
         number = change.sequence_number
         if number < proxy.next_sn and not self._begins_anew(proxy, number):
+            self._on_dropped(DropReason.OUT_OF_ORDER, proxy.guid, number)
             return 0
         proxy.contradictions = 0
         is_first = proxy.last_seq == 0
@@ -201,9 +207,13 @@ class StatefulReader:
     def _receive_reliable(self, proxy: WriterProxy, change: CacheChange, now: float) -> None:
         number = change.sequence_number
         if number < proxy.next_sn:
+            self._on_dropped(DropReason.DUPLICATE, proxy.guid, number)
             return
         proxy.last_seq = max(proxy.last_seq, number)
-        proxy.reorder.add(change)
+        is_known = number in proxy.reorder
+        if not proxy.reorder.add(change):
+            reason = DropReason.DUPLICATE if is_known else DropReason.TABLE_FULL_REORDER
+            self._on_dropped(reason, proxy.guid, number)
         proxy.schedule.arrived(now, number)
         self._progressed(proxy, now)
 
@@ -217,7 +227,10 @@ class StatefulReader:
         self, proxy: WriterProxy, first: int, last: int, count: int, now: float, *, final: bool
     ) -> int:
         """HEARTBEAT: returns how many numbers are lost for good.  RTPS 2.5 §8.3.8.6, §8.4.12.2.3."""
-        if not proxy.is_reliable or not proxy.accepts_heartbeat(count, now):
+        if not proxy.is_reliable:
+            return 0
+        if not proxy.accepts_heartbeat(count, now):
+            self._on_dropped(DropReason.STALE_COUNT, proxy.guid, count)
             return 0
         lost = proxy.receive_heartbeat(first, last, now, final=final)
         self._deliver(proxy, now)
@@ -301,6 +314,7 @@ class StatefulReader:
     def fragment_received(self, proxy: WriterProxy, sequence_number: int, now: float) -> bool:
         """A fragment of this number came: is the sample wanted at all?  It is known to exist from now on."""
         if sequence_number < proxy.next_sn:
+            self._on_dropped(DropReason.DUPLICATE, proxy.guid, sequence_number)
             return False
         if proxy.is_reliable:
             proxy.last_seq = max(proxy.last_seq, sequence_number - 1)

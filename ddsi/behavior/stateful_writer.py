@@ -19,6 +19,8 @@ from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
+from ..trace.reasons import DropReason
+from .dropping import WhenDropped, drop_silently
 from .filtered import directed_heartbeat_range, gap_for, is_irrelevant
 from .reader_proxy import ReaderProxy
 from .schedules import HeartbeatSchedule
@@ -43,8 +45,12 @@ class StatefulWriter:
         *,
         fragment_octets: int,
         unacknowledged_octets_max: int,
+        on_dropped: WhenDropped = drop_silently,
     ) -> None:
-        """``fragment_octets``: payloads larger than this travel in fragments of this size, which may change later."""
+        """``fragment_octets``: payloads larger than this travel in fragments of this size, which may change later.
+
+        ``on_dropped`` is told what is not acted upon: why, whose it was, its sequence number or count.
+        """
         self.guid = guid
         self.qos = qos
         self.cache = WriterHistoryCache(qos)
@@ -58,6 +64,7 @@ class StatefulWriter:
         self.heartbeat = HeartbeatSchedule()
         self._reliable_readers = 0
         self._unacknowledged_octets_max = unacknowledged_octets_max
+        self._on_dropped = on_dropped
         self._next_unsent_fragment = 1
         self._pace_due = math.inf
         self._heartbeat_count = 0
@@ -383,9 +390,13 @@ class StatefulWriter:
         if preemptive:
             proxy.accepts_acknack(count, now)
             if not proxy.accepts_preemptive(now):
+                self._on_dropped(DropReason.RATE_LIMITED, proxy.guid, count)
                 return []
         elif not proxy.accepts_acknack(count, now):
+            self._on_dropped(DropReason.STALE_COUNT, proxy.guid, count)
             return []
+        if requested.base > self.cache.last_sn + 1:
+            self._on_dropped(DropReason.INVALID_SEQUENCE, proxy.guid, requested.base)
         proxy.progress_time = now
         was_stalled, proxy.is_stalled = proxy.is_stalled, False
         if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:
@@ -435,7 +446,10 @@ class StatefulWriter:
         self, proxy: ReaderProxy, sequence_number: int, missing: NumberSet, count: int, now: float
     ) -> list[WriterTransmission]:
         """NACK_FRAG: some fragments of one change are missing.  RTPS 2.5 §8.3.8.10, §8.4.14.1."""
-        if not (self.is_reliable and proxy.is_reliable and proxy.accepts_nack_frag(count, now)):
+        if not (self.is_reliable and proxy.is_reliable):
+            return []
+        if not proxy.accepts_nack_frag(count, now):
+            self._on_dropped(DropReason.STALE_COUNT, proxy.guid, count)
             return []
         proxy.progress_time = now
         if sequence_number > min(self.next_unsent_sn, self.cache.last_sn):

@@ -57,6 +57,8 @@ _MOST_WORK = 16_384
 _WORK_OF_A_PARTICIPANT = 1024
 _WORK_OF_A_FRAGMENTED_SAMPLE = 256
 _UNKNOWN_PREFIX = bytes(12)
+# INFO_REPLY is understood and not acted upon: answers go to the locators that the participant announced.
+_WITHOUT_EFFECT = frozenset({SubmessageKind.PAD, SubmessageKind.INFO_REPLY, SubmessageKind.INFO_REPLY_IP4})
 _KEY_HASH_QOS = 24  # octets of an inline QoS that holds a key hash alone
 _CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
 
@@ -111,7 +113,6 @@ class Inbound:
             SubmessageKind.INFO_DST: self._info_destination,
             SubmessageKind.INFO_SRC: self._info_source,
         }
-        # INFO_REPLY is not acted upon: answers go to the locators that the participant announced.
 
     def receive(self, octets: Octets, source: Locator, now: float) -> None:
         """One datagram.  Raises nothing; what is dropped is counted by reason."""
@@ -201,8 +202,10 @@ class Inbound:
                 envelope_start = raw.offset
             else:
                 handler = self._handlers.get(kind)
-                if handler is not None:  # unknown and vendors' own kinds are skipped (RTPS 2.5 §8.3.4.1)
+                if handler is not None:
                     handler(incoming, raw)
+                elif kind < 0x80 and kind not in _WITHOUT_EFFECT:  # vendors' own are to be skipped (RTPS 2.5 §8.3.4.1)
+                    self._engine.dropped(DropReason.UNSUPPORTED, incoming.source, submessage_name(kind))
                 return raw.end
         return len(view)
 
@@ -247,6 +250,8 @@ class Inbound:
         prefix = bytes(InfoDestination.decode(raw.flags, raw.body).guid_prefix)
         incoming.destination = prefix
         incoming.is_for_us = prefix in (self._own_prefix, _UNKNOWN_PREFIX)
+        if not incoming.is_for_us:
+            self._engine.dropped(DropReason.NOT_FOR_US, incoming.source)
 
     def _info_source(self, incoming: Incoming, raw: RawSubmessage) -> None:
         info = InfoSource.decode(raw.flags, raw.body)
@@ -365,6 +370,8 @@ class Inbound:
     def _change(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, change: CacheChange) -> None:
         """To every matched reader that it is addressed to."""
         now = incoming.now
+        if reader_id != _UNKNOWN_ID and all(reader_id != reader.guid[12:] for reader, _ in remote.readers):
+            self._engine.dropped(DropReason.UNKNOWN_ENDPOINT, incoming.source)
         for reader, proxy in remote.readers:
             if reader_id != _UNKNOWN_ID and reader_id != reader.guid[12:]:
                 continue
@@ -526,11 +533,14 @@ class Inbound:
         if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return []
-        return [
+        pairs = [
             (self._engine.local_readers[reader.guid], proxy)
             for reader, proxy in remote.readers
             if reader_id in (_UNKNOWN_ID, reader.guid[12:])
         ]
+        if not pairs:
+            self._engine.dropped(DropReason.UNKNOWN_ENDPOINT, incoming.source)
+        return pairs
 
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)

@@ -559,6 +559,12 @@ class Participant:
         if self.recorder.is_on:
             self.recorder.dropped(reason, source, detail)
 
+    def _dropped_by_endpoint(self, reason: DropReason, remote: Guid, number: int) -> None:
+        """One of our readers or writers had no use for this: a sequence number, or a count."""
+        self.drops[reason] += 1
+        if self.recorder.is_on:
+            self.recorder.dropped(reason, None, f"#{number}", remote)
+
     def dropped_discovery(self, change: CacheChange, detail: str) -> None:
         self.dropped(DropReason.MALFORMED_DISCOVERY_DATA, None, f"{change.writer_guid}: {detail}")
 
@@ -576,6 +582,7 @@ class Participant:
         self.recorder.samples_lost(reader.guid, writer, number, number, SampleLossReason.MALFORMED_SAMPLE, detail)
 
     def _sample_rejected(self, guid: Guid, reason: str) -> None:
+        self.drops[DropReason.READER_FULL] += 1
         self.status(guid, self.local_readers[guid].sample_rejected(reason))
 
     def send_spdp(self, submessage: bytes, destinations: tuple[Locator, ...]) -> None:
@@ -672,6 +679,7 @@ class Participant:
                 self._max_message_octets, self.config.fragment_size, self.hooks.overhead(data.guid, ())
             ),
             unacknowledged_octets_max=self.config.unacknowledged_octets,
+            on_dropped=self._dropped_by_endpoint,
         )
         writer = self.local_writers[data.guid] = LocalWriter(data, behavior, self.outbound.new_packer())
         return writer
@@ -691,6 +699,7 @@ class Participant:
             history,
             reorder_max_samples=self.config.max_reorder_samples,
             reorder_max_octets=_REORDER_MAX_OCTETS,
+            on_dropped=self._dropped_by_endpoint,
         )
         cache = history if isinstance(history, ReaderHistoryCache) else None
         reader = self.local_readers[data.guid] = LocalReader(data, behavior, cache, keys)

@@ -68,8 +68,8 @@ class Recorder:
     def sent(self, effect: SendDatagram) -> None:
         self._put("MessageSent", effect.destinations, b"".join(effect.parts))
 
-    def dropped(self, reason: DropReason, source: Locator | None, detail: str) -> None:
-        self._put("Dropped", reason, source, detail)
+    def dropped(self, reason: DropReason, source: Locator | None, detail: str, remote: Guid | None = None) -> None:
+        self._put("Dropped", reason, source, detail, remote)
 
     # --- discovery and matching --------------------------------------------------------------------------
 

@@ -86,7 +86,7 @@ class MessageReceived(TraceEvent):
 class Dropped(TraceEvent):
     """A datagram, a part of one, or an announcement was not acted upon.
 
-    ``source`` is None for what we drop on the way out.  ``remote`` is whom it is from, where that is known.
+    ``source`` is None for what we drop on the way out, and where only ``remote`` is known: whom it is from.
     """
 
     NAME: ClassVar[str] = "dropped"

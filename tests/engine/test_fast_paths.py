@@ -29,13 +29,12 @@ BEST_EFFORT = Qos(reliability=BestEffort(), history=KeepAll())
 
 
 class GeneralInbound(Inbound):
-    """Every submessage by ``iterate_submessages`` and its class; what the specification says, and nothing shorter."""
+    """Every submessage by ``iterate_submessages`` and its class: what the specification says, and nothing shorter."""
 
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
-        for raw in iterate_submessages(view, start=start):
-            handler = self._handlers.get(raw.kind)
-            if handler is not None:
-                handler(incoming, raw)
+        position = start
+        while len(view) - position >= 4:
+            position = self._general_submessages(incoming, view, position)
 
 
 @dataclass
