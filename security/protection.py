@@ -189,9 +189,12 @@ class Protection:
         if isinstance(plain, Outcome):
             return plain
         remote.opened += 1
-        if self._speaks_for_itself(plain, pair):
-            return plain
-        return Rejected(f"it was protected by {pair.remote}, and speaks for another")
+        if not self._speaks_for_itself(plain, pair):
+            return Rejected(f"it was protected by {pair.remote}, and speaks for another")
+        if pair.local.is_volatile and remote.handshake is not None:
+            # Only who shares the secret can have said that.  A peer may have no key for us (OpenDDS), but it answers.
+            remote.handshake.confirm()
+        return plain
 
     def _speaks_for_itself(self, plain: Octets, pair: Pair) -> bool:
         """Is the sender that a submessage names the one whose key opened it?  INFO_TS names none (Fast DDS)."""
