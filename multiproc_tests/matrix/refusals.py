@@ -20,7 +20,7 @@ from ..peers.peer import Ability
 from .cases import Case
 from .stories import Cast, Story, deliver
 
-__all__ = ["REFUSAL_CASES"]
+__all__ = ["REFUSAL_CASES", "until_said"]
 
 SILENCE = 4.0
 """Seconds without a sample that are enough where nobody says why."""
@@ -219,7 +219,7 @@ def _refuse(refusal: Refusal, *, is_reversed: bool) -> Story:
         ]
         due = [(process, reason) for process, reason in reasons if reason is not None]
         for process, reason in due:
-            await _until_said(process, reason, timeout=cast.patience)
+            await until_said(process, reason, timeout=cast.patience)
         if not due:
             await trio.sleep(SILENCE)
         if subscriber.matches("SAMPLE .*"):
@@ -228,7 +228,7 @@ def _refuse(refusal: Refusal, *, is_reversed: bool) -> Story:
     return story
 
 
-async def _until_said(process: Process, reason: str, *, timeout: float) -> None:
+async def until_said(process: Process, reason: str, *, timeout: float) -> None:
     """In any line, whatever stands before and behind it: the others write to their logs as they like."""
     expression = re.compile(reason)
     with trio.move_on_after(timeout):

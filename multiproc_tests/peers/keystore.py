@@ -136,8 +136,12 @@ class PeerKeystore:
         rights: Rights | None = None,
         authority: Authority | None = None,
         validity: Validity | None = None,
+        granted: Validity | None = None,
     ) -> Identity:
-        """A certificate, issued by the identity CA or by another, its key, and its permissions."""
+        """A certificate, issued by the identity CA or by another, its key, and its permissions.
+
+        The permissions are ``granted`` for as long as the certificate is valid, unless otherwise said.
+        """
         subject = parse_name(f"/O=Peers/CN={name}")
         identity = Identity.create(authority or self.identity_ca, subject, self.algorithm, validity or _validity())
         self.add(f"{name}.pem", certificate_pem(identity.certificate))
@@ -145,7 +149,7 @@ class PeerKeystore:
         grant = GrantDraft(
             name=name,
             subject_name=identity.subject_name,
-            validity=certificate_validity(identity.certificate),
+            validity=granted or certificate_validity(identity.certificate),
             rights=rights or Rights(domains=ALL_DOMAINS),
         )
         self.add(f"{name}.permissions.p7s", self.permissions_ca.sign_document(permissions_xml([grant])))

@@ -93,7 +93,8 @@ def participant_qos(o: Arguments) -> ddsi.Qos:
     }
     if os.path.exists(f"{o.store}/{REVOCATION_LIST}"):
         files["dds.sec.auth.crl"] = REVOCATION_LIST
-    return ddsi.Qos(properties={name: f"file:{o.store}/{file}" for name, file in files.items()})
+    properties = {name: f"file:{o.store}/{file}" for name, file in files.items()}
+    return ddsi.Qos(properties={**properties, "dds.sec.log.log_level": "WARNING_LEVEL"})
 
 
 def endpoint_qos(o: Arguments) -> ddsi.Qos:
@@ -219,10 +220,12 @@ async def subscribe(o: Arguments, reader: Any) -> int:
 
 
 async def watch_refusals(entity: Any) -> None:
-    """Says whom security refuses, and why."""
+    """Says whom security refuses, and when it is ourselves, and why."""
     async for event in entity.events():
         if isinstance(event, ddsi.SecurityRefused):
             say("REFUSED", event.reason)
+        elif isinstance(event, ddsi.SecurityRevoked):
+            say("REVOKED", event.reason)
 
 
 async def main() -> int:
