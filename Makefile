@@ -46,6 +46,7 @@ format: $(VENV)/.ready-to-lint  ## Let ruff lay out the code
 
 interop: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers  ## Every case with every peer; writes docs/interop
 	$(BIN)/python -m multiproc_tests.interop $(ARGS)
+	$(if $(ARGS),,$(BIN)/python -m multiproc_tests.omg)
 
 fuzz: $(VENV)/.ready-to-fuzz  ## Coverage-guided, one TARGET for SECONDS; without a TARGET, all in turn
 	$(BIN)/python -m tests.fuzz $(or $(TARGET),all) $(or $(SECONDS),60)

@@ -1,0 +1,18 @@
+"""What the other implementation cannot do, with itself or with ours: failures that are expected and explained.
+
+A case that passes all the same is reported as passed.
+"""
+
+from __future__ import annotations
+
+from .cases import SuiteCase
+
+__all__ = ["known_limit"]
+
+_LIMITS: dict[tuple[str, str, str], str] = {}
+"""By case, publisher and subscriber."""
+
+
+def known_limit(case: SuiteCase, publisher: str, subscriber: str) -> str | None:
+    """Why this combination is expected to fail, or None."""
+    return _LIMITS.get((case.name, publisher, subscriber))
