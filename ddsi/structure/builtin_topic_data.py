@@ -70,7 +70,7 @@ class _EndpointBuiltinTopicData:
 
     @property
     def data_tags(self) -> tuple[tuple[str, str], ...]:
-        """Names and values.  DDS-Security 1.1 §7.2.5; proved where ``security.is_discovery_protected``."""
+        """Names and values.  DDS-Security 1.1 §7.2.5; anybody's claim unless ``security.is_discovery_protected``."""
         return self.qos.data_tags.tags
 
     @property

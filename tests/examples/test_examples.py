@@ -186,3 +186,50 @@ def test_secured_tells_how_to_make_the_keystore_that_it_misses(tmp_path: Path) -
     told = [line for line in done.stderr.splitlines() if line.startswith("    ddsi keystore ")]
     assert len(told) == 2
     assert all(line in (ast.get_docstring(ast.parse(SECURED.read_text(encoding="utf-8"))) or "") for line in told)
+
+
+WHO = EXAMPLES / "07_who_is_there.py"
+
+
+def who_came_and_went(alice: str, bob: str) -> set[str]:
+    """What it prints when these are the identities of the two; in which order they come, chance decides."""
+    there = {
+        f"participant station                     {alice}",
+        f"writer      thermometer of Temperatures {alice}",
+        f"participant office                      {bob}",
+        f"reader      display of Temperatures     {bob}",
+    }
+    return {f"{sign} {line}" for sign in "+-" for line in there}
+
+
+def assert_they_came_and_went(lines: list[str], alice: str, bob: str) -> None:
+    expected = who_came_and_went(alice, bob)
+    assert {line for line in lines if line[0] in "+-"} == expected
+    for came in (line for line in expected if line[0] == "+"):
+        assert lines.index(came) < lines.index("-" + came[1:])
+
+
+def test_who_is_there() -> None:
+    lines = output_of(WHO)
+    assert_they_came_and_went(lines, "not authenticated", "not authenticated")
+    told = "  11.0 degrees came for everybody to see, from the thermometer, not authenticated"
+    assert [line for line in lines if line[0] == " "] == [told]
+
+
+def test_who_is_there_and_has_proved_it(keystore: Path) -> None:
+    lines = output_of(WHO, "keystore/enclaves", folder=keystore)
+    assert_they_came_and_went(lines, "CN=alice", "CN=bob")
+    told = "  11.0 degrees came protected, from the thermometer, CN=alice"
+    assert [line for line in lines if line[0] == " "] == [told]
+
+
+def test_who_is_there_in_another_process() -> None:
+    env = environment()
+    with in_background(WHO.name, "watch", env) as watcher:
+        subprocess.run([sys.executable, str(WHO)], env=env, stdout=subprocess.DEVNULL, timeout=30, check=True)
+        assert watcher.stdout is not None
+        expected = who_came_and_went("not authenticated", "not authenticated")
+        while expected:
+            line = watcher.stdout.readline()
+            assert line, f"it ended without {expected}"
+            expected.discard(line.rstrip("\n"))

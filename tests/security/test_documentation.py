@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import re
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos_policies import Properties
+from ddsi.structure.security_information import EndpointSecurity, ParticipantSecurity
 from ddsi_security import plugins, properties
 from ddsi_security.builtin_logging_type import LOG_TOPIC_NAME
 from ddsi_security.loading import KINDS
@@ -47,6 +49,18 @@ def test_what_is_skipped_is_named() -> None:
     skipped = {name.removeprefix("dds.sec.").partition(".")[2] for name in properties._IGNORED}
     paragraph = TEXT[TEXT.index("What only other stacks understand") :].partition("\n\n")[0]
     assert set(re.findall(r"`([^`]+)`", paragraph)) == skipped
+
+
+def test_the_fields_that_applications_see_are_those_that_there_are() -> None:
+    told: dict[str, set[str]] = {"participants": set(), "endpoints": set()}
+    rows = TEXT[TEXT.index("| field | of |") :].partition("\n\n")[0].splitlines()[2:]
+    for row in rows:
+        names, whose, _ = (cell.strip() for cell in row.strip("|").split("|"))
+        for kind in told:
+            if whose in (kind, "both"):
+                told[kind].update(re.findall(r"`(\w+)`", names))
+    assert told["participants"] == {field.name for field in fields(ParticipantSecurity)}
+    assert told["endpoints"] == {field.name for field in fields(EndpointSecurity)}
 
 
 def test_the_program_configures_what_it_says() -> None:
