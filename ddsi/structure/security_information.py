@@ -55,8 +55,9 @@ class EndpointSecurity(_Identity):
     ``is_authenticated``: its participant has proved who it is, and may be here.  ``subject_name``: of that certificate,
     as RFC 4514 text.  ``is_read_protected``, ``is_write_protected``: only who has the right may subscribe, or publish.
     ``is_discovery_protected``: its announcement came protected, so nobody who is not authenticated can have made up its
-    QoS and data tags.  ``is_submessage_protected``, ``is_payload_protected``: so is its data on the way.  ``plugin_attributes``: the
-    mask in which the cryptographic plugin says how (the builtin one's: §9.4.2.5); 0 where it has none.
+    QoS and data tags.  ``is_submessage_protected``, ``is_payload_protected``: so is its data on the way.
+    ``plugin_attributes``: the mask in which the cryptographic plugin says how (the builtin one's: §9.4.2.5); 0 where it
+    has none.
     """
 
     is_read_protected: bool = False
