@@ -68,6 +68,22 @@ class ReorderBuffer:
         self._octets += size
         return True
 
+    def drop_farthest(self, *, beyond: int) -> int:
+        """Let the change go that is farthest off, if it lies ``beyond``: returns its number, 0 if there is none.
+
+        What is nearer is wanted sooner; and a number that nobody will ever reach must not keep a place for ever.
+        """
+        farthest = max(self._changes, default=0)
+        if farthest <= beyond:
+            return 0
+        self._octets -= len(self._changes.pop(farthest).payload)
+        return farthest
+
+    @property
+    def highest_sn(self) -> int:
+        """The highest number that is held; where none is, that before ``next_sn``."""
+        return max(self._changes, default=self.next_sn - 1)
+
     def head(self) -> CacheChange | None:
         """The change whose turn it is, if it is here; steps over irrelevant numbers first."""
         while self._range_starts and self._range_starts[0] <= self.next_sn:

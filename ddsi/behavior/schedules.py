@@ -146,6 +146,11 @@ class AckNackSchedule:
         """From when on the same may be asked for again."""
         return self._asked_at + self._repeat
 
+    @property
+    def is_in_vain(self) -> bool:
+        """Was the same asked for again and again, until asking more seldom is not possible?"""
+        return self._repeat >= NACK_REPEAT_MAX
+
     def may_repeat(self, now: float) -> bool:
         """May what was asked for be asked for again: is the answer overdue?"""
         return now >= (self._asked_at + self._answer_time if self.is_wanted else self.repeat_due)

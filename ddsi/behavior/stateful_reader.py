@@ -210,10 +210,13 @@ class StatefulReader:
             self._on_dropped(DropReason.DUPLICATE, proxy.guid, number)
             return
         proxy.last_seq = max(proxy.last_seq, number)
-        is_known = number in proxy.reorder
-        if not proxy.reorder.add(change):
-            reason = DropReason.DUPLICATE if is_known else DropReason.TABLE_FULL_REORDER
-            self._on_dropped(reason, proxy.guid, number)
+        if number in proxy.reorder:
+            self._on_dropped(DropReason.DUPLICATE, proxy.guid, number)
+        while number not in proxy.reorder and not proxy.reorder.add(change):
+            farthest = proxy.reorder.drop_farthest(beyond=number)
+            self._on_dropped(DropReason.TABLE_FULL_REORDER, proxy.guid, farthest or number)
+            if not farthest:
+                break
         proxy.schedule.arrived(now, number)
         self._progressed(proxy, now)
 

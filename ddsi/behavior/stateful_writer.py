@@ -396,7 +396,9 @@ class StatefulWriter:
             self._on_dropped(DropReason.STALE_COUNT, proxy.guid, count)
             return []
         if requested.base > self.cache.last_sn + 1:
+            # Forged, or by a reader that was told lies.  The truth helps it; to believe it would end our heartbeats.
             self._on_dropped(DropReason.INVALID_SEQUENCE, proxy.guid, requested.base)
+            return [self.directed_heartbeat(proxy)]
         proxy.progress_time = now
         was_stalled, proxy.is_stalled = proxy.is_stalled, False
         if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:

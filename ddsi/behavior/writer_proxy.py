@@ -150,7 +150,8 @@ class WriterProxy:
         is_known = last >= self.reorder.next_sn - 1 or self.uses_filter
         self.contradictions = 0 if is_known else self.contradictions + 1
         lost = self.reorder.skip_to(first)
-        self.last_seq = max(self.last_seq, last)
+        # Not the most that was ever said, which anybody may have forged: the writer knows best what it has.
+        self.last_seq = max(self.reorder.highest_sn, last)
         if self.historical_sn < 0:
             self.historical_sn = last
         if not final or self.contradictions:
@@ -180,10 +181,11 @@ class WriterProxy:
         """What is here and what is not.
 
         Final, as no HEARTBEAT is wanted in return but for data that is asked for.  Only a writer that has just
-        contradicted itself is to say again what it has.
+        contradicted itself, or that was asked in vain for long, is to say again what it has.
         """
         self._acknack_count += 1
-        return SendAckNack(missing, self._acknack_count, final=not self.contradictions)
+        is_doubtful = self.contradictions > 0 or self.schedule.is_in_vain
+        return SendAckNack(missing, self._acknack_count, final=not is_doubtful)
 
     def nack_frag(self, sequence_number: int, missing: NumberSet) -> SendNackFrag:
         self._nack_frag_count += 1

@@ -395,8 +395,10 @@ def test_acknowledgment_never_goes_back_nor_beyond_what_was_written() -> None:
     proxy = match(writer)
     send(writer, b"", b"")
     acknack(writer, proxy, 10**12, count=1)
+    assert (proxy.acked_sn, writer.min_acked_sn()) == (0, 0), "whoever says so knows nothing of this writer"
+    acknack(writer, proxy, 3, count=2)
     assert (proxy.acked_sn, writer.min_acked_sn()) == (2, 2)
-    acknack(writer, proxy, 1, count=2)
+    acknack(writer, proxy, 1, count=3)
     assert proxy.acked_sn == 2
 
 
