@@ -132,6 +132,9 @@ class FilteringWriter(StatefulWriter):
         local = [proxy.acked_sn for proxy in self.local_readers.values() if proxy.is_reliable]
         return min([*lagging, *local, self.next_unsent_sn - 1 if self.readers else self.cache.last_sn])
 
+    def _has_lagging_readers(self) -> bool:
+        return any(self._lags(proxy) for proxy in self.readers.values())
+
     def _lags(self, proxy: ReaderProxy) -> bool:
         return proxy.is_reliable and proxy.acked_sn < proxy.lst_seq
 

@@ -79,9 +79,9 @@ class ReaderProxy:
         return self._participant
 
     @property
-    def is_catching_up(self) -> bool:
-        """Does it still lack history from before the match?"""
-        return self.acked_sn < self.match_sn
+    def holds_window(self) -> bool:
+        """Does what it lacks hold back what is new?  Not if it is silent, nor while it lacks older history."""
+        return not self.is_stalled and self.acked_sn >= self.match_sn
 
     def is_relevant(self, change: CacheChange) -> bool:
         """Is the change meant for this reader?  RTPS 2.5 §8.4.7.5 (DDS_FILTER), DDS-Security 1.1 §7.4.4.4.

@@ -20,6 +20,7 @@ from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason
+from .acked_numbers import AckedNumbers
 from .dropping import WhenDropped, drop_silently
 from .filtered import directed_heartbeat_range, gap_for, is_irrelevant
 from .reader_proxy import ReaderProxy
@@ -63,6 +64,9 @@ class StatefulWriter:
         self.window = SendWindow()
         self.heartbeat = HeartbeatSchedule()
         self._reliable_readers = 0
+        # How far the reliable readers of other participants have acknowledged, and those of them that hold the window.
+        self._acked, self._acked_in_window = AckedNumbers(), AckedNumbers()
+        self._locator_uses: dict[Locator, int] = {}
         self._unacknowledged_octets_max = unacknowledged_octets_max
         self._on_dropped = on_dropped
         self._next_unsent_fragment = 1
@@ -163,11 +167,10 @@ class StatefulWriter:
 
         What best-effort readers were not sent yet counts as not acknowledged.
         """
-        acked = self.next_unsent_sn - 1 if self.readers else self.cache.last_sn
-        for proxies in (self.readers, self.local_readers):
-            for proxy in proxies.values():
-                if proxy.is_reliable and proxy.acked_sn < acked:
-                    acked = proxy.acked_sn
+        acked = min(self.next_unsent_sn - 1 if self.readers else self.cache.last_sn, self._acked.lowest)
+        for proxy in self.local_readers.values():
+            if proxy.is_reliable and proxy.acked_sn < acked:
+                acked = proxy.acked_sn
         return acked
 
     # --- matching ----------------------------------------------------------------------------------------
@@ -179,8 +182,11 @@ class StatefulWriter:
         proxy = ReaderProxy(data, locators, history_sn=self._history_sn_for(data, self.next_unsent_sn - 1), now=now)
         proxy.match_sn = self.next_unsent_sn - 1
         self._proxy_added(proxy)
+        self._forget_reader(data.guid)
         self.readers[data.guid] = proxy
-        self._matched_readers_changed()
+        self._reliable_readers += self.is_reliable and proxy.is_reliable
+        self._count(proxy)
+        self._locators_changed((), proxy.locators)
         if not (self.is_reliable and proxy.is_reliable):
             return []
         if self._lags(proxy):
@@ -195,18 +201,37 @@ class StatefulWriter:
 
     def matched_reader_remove(self, guid: Guid, now: float) -> None:
         """RTPS 2.5 §8.4.7.3.3.  What only this reader lacked counts as acknowledged from now on."""
-        proxy = self.local_readers.pop(guid, None) or self.readers.pop(guid, None)
+        proxy = self.local_readers.pop(guid, None) or self._forget_reader(guid)
         if proxy is not None:
             self._proxy_removed(proxy)
-            self._matched_readers_changed()
             self._acknowledged(proxy, now)
+
+    def _forget_reader(self, guid: Guid) -> ReaderProxy | None:
+        """One of another participant, if there is such a one."""
+        proxy = self.readers.pop(guid, None)
+        if proxy is not None:
+            self._reliable_readers -= self.is_reliable and proxy.is_reliable
+            self._discount(proxy)
+            self._locators_changed(proxy.locators, ())
+        return proxy
 
     def matched_reader_update(self, guid: Guid, data: DiscoveredReaderData, locators: tuple[Locator, ...]) -> None:
         """The reader announced itself anew, perhaps from elsewhere."""
         proxy = self.readers[guid]
         proxy.data = data
+        self._locators_changed(proxy.locators, locators)
         proxy.locators = locators
-        self._matched_readers_changed()
+
+    def _locators_changed(self, before: tuple[Locator, ...], after: tuple[Locator, ...]) -> None:
+        """Of one reader.  Several may be reached at the same place, which a sample is sent to once."""
+        uses = self._locator_uses
+        for locator in after:
+            uses[locator] = uses.get(locator, 0) + 1
+        for locator in before:
+            uses[locator] -= 1
+            if not uses[locator]:
+                del uses[locator]
+        self.locators = tuple(uses)
 
     # --- what is new -------------------------------------------------------------------------------------
 
@@ -325,6 +350,9 @@ class StatefulWriter:
         """Was it sent something that it has not acknowledged?"""
         return proxy.is_reliable and proxy.acked_sn < self.next_unsent_sn - 1
 
+    def _has_lagging_readers(self) -> bool:
+        return self._acked.lowest < self.next_unsent_sn - 1
+
     def _lagging_readers(self) -> list[ReaderProxy]:
         return [proxy for proxy in self.readers.values() if self._lags(proxy)]
 
@@ -370,7 +398,9 @@ class StatefulWriter:
             if not p.is_stalled and now - p.progress_time > _STALLED_AFTER_S and self._window_is_full()
         ]
         for proxy in newly:
+            self._discount(proxy)
             proxy.is_stalled = True
+            self._count(proxy)
         if newly:
             self._drain_in_flight()
         return bool(newly) and not self._window_is_full()
@@ -400,8 +430,11 @@ class StatefulWriter:
             self._on_dropped(DropReason.INVALID_SEQUENCE, proxy.guid, requested.base)
             return [self.directed_heartbeat(proxy)]
         proxy.progress_time = now
+        self._discount(proxy)
         was_stalled, proxy.is_stalled = proxy.is_stalled, False
-        if proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn)) or was_stalled:
+        is_news = proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn))
+        self._count(proxy)
+        if is_news or was_stalled:
             self._acknowledged(proxy, now)
         out = self._requested_changes(proxy, requested, now) if requested else []
         if not final or (out and self._lags(proxy)):
@@ -483,7 +516,7 @@ class StatefulWriter:
         self._drain_in_flight()
         # What was not sent yet is lacked by all: a local reader takes a change before it leaves for the others.
         all_sent = self.next_unsent_sn > self.cache.last_sn
-        self.heartbeat.progress(now, complete=all_sent and not self._lagging_readers())
+        self.heartbeat.progress(now, complete=all_sent and not self._has_lagging_readers())
 
     def _free_acknowledged(self, proxy: ReaderProxy) -> None:
         """This reader has more than before, or is gone."""
@@ -495,15 +528,22 @@ class StatefulWriter:
     def _proxy_removed(self, proxy: ReaderProxy) -> None:
         """A reader is matched no more."""
 
+    def _count(self, proxy: ReaderProxy) -> None:
+        """Among those whose numbers :attr:`_acked` and :attr:`_acked_in_window` know."""
+        if proxy.is_reliable:
+            self._acked.add(proxy.acked_sn)
+            if proxy.holds_window:
+                self._acked_in_window.add(proxy.acked_sn)
+
+    def _discount(self, proxy: ReaderProxy) -> None:
+        """Its number is about to change, or whether it holds the window, or it goes."""
+        if proxy.is_reliable:
+            self._acked.remove(proxy.acked_sn)
+            if proxy.holds_window:
+                self._acked_in_window.remove(proxy.acked_sn)
+
     def _drain_in_flight(self) -> None:
-        acked = min(
-            (
-                proxy.acked_sn
-                for proxy in self.readers.values()
-                if proxy.is_reliable and not proxy.is_stalled and not proxy.is_catching_up
-            ),
-            default=self.cache.last_sn,
-        )
+        acked = min(self._acked_in_window.lowest, self.cache.last_sn)
         freed = 0
         in_flight = self._in_flight
         while in_flight and in_flight[0][0] <= acked:
@@ -518,10 +558,6 @@ class StatefulWriter:
         """
         wants_history = data.qos.is_transient_local and data.qos.is_reliable and self.qos.is_transient_local
         return 0 if wants_history else sent_sn
-
-    def _matched_readers_changed(self) -> None:
-        self._reliable_readers = sum(proxy.is_reliable for proxy in self.readers.values()) if self.is_reliable else 0
-        self.locators = tuple(dict.fromkeys(locator for proxy in self.readers.values() for locator in proxy.locators))
 
 
 def _runs(numbers: list[int]) -> list[tuple[int, int]]:
