@@ -23,12 +23,14 @@ class ParticipantProxy:
     """``last_heard``: engine time of the last datagram from it, which is all that a lease needs.
 
     ``last_manual_assertion``: when it last said that its manual writers live; ``last_protected_assertion``: on the
-    secure topic.
+    secure topic.  ``announcement``: vendor, version and octets that ``data`` was read from, if they say all of it; the
+    same again need not be read.
     """
 
     __slots__ = (
         "_endpoint_hosts",
         "_hosts",
+        "announcement",
         "data",
         "endpoint_count",
         "guid",
@@ -43,6 +45,7 @@ class ParticipantProxy:
 
     def __init__(self, data: DiscoveredParticipantData, now: float) -> None:
         self.data = data
+        self.announcement: tuple[bytes, tuple[int, int], bytes] | None = None
         self.guid: Guid = data.guid
         self.prefix: GuidPrefix = data.guid.prefix
         self.last_heard = now

@@ -159,6 +159,12 @@ class DiscoveryAgent:
 
     def receive_spdp(self, incoming: Incoming, change: CacheChange) -> None:
         """SPDPdiscoveredParticipantData, or the end of a participant."""
+        said: tuple[bytes, tuple[int, int], bytes] | None
+        said = (incoming.vendor_id, incoming.version, bytes(change.payload))
+        proxy = self._engine.participants.get(change.writer_guid.prefix)
+        if proxy is not None and proxy.announcement == said and change.kind is ChangeKind.ALIVE:
+            self._repeated(proxy, incoming.now)
+            return
         try:
             if change.kind is not ChangeKind.ALIVE:
                 guid = decode_key(change.payload, ParameterId.PARTICIPANT_GUID, key_hash=change.key_hash)
@@ -178,7 +184,16 @@ class DiscoveryAgent:
             return
         if not data.metatraffic_unicast and not data.default_unicast:
             data = replace(data, metatraffic_unicast=(incoming.source,))
+            said = None  # the next may come from elsewhere
         self._participant_announced(incoming, data)
+        proxy = self._engine.participants.get(data.guid.prefix)
+        if proxy is not None and proxy.data == data:
+            proxy.announcement = said
+
+    def _repeated(self, proxy: ParticipantProxy, now: float) -> None:
+        """It says the same as before; among many participants hardly anything else is heard."""
+        if proxy.refusal:
+            self._engine.admission.announced_again(proxy, now)
 
     def receive_secure_spdp(self, change: CacheChange, now: float) -> None:
         """What an authenticated participant says of itself.  DDS-Security 1.1 §7.4.1.6 (DCPSParticipantsSecure)."""
@@ -246,10 +261,9 @@ class DiscoveryAgent:
     ) -> None:
         engine = self._engine
         if data == proxy.data:
-            if proxy.refusal:
-                engine.admission.announced_again(proxy, now)
+            self._repeated(proxy, now)
             return
-        before, proxy.data = proxy.data, data
+        before, proxy.data, proxy.announcement = proxy.data, data, None
         engine.alarms.lease(proxy)
         engine.recorder.participant(data, is_new=False)
         engine.admission.announced_again(proxy, now)
