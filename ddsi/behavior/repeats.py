@@ -58,6 +58,10 @@ class RepeatFilter:
             del self._positions[next(iter(self._positions))]
         self._positions[writer] = position
 
+    def position_of(self, writer: Guid) -> Position | None:
+        """Where the reader had come with a writer that it has lost, and that has sent nothing new since."""
+        return self._positions.get(writer)
+
     def add(self, change: CacheChange, now: float) -> bool:
         position = self._positions.get(change.writer_guid)
         if position is not None:

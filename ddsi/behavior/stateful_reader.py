@@ -123,6 +123,8 @@ class StatefulReader:
         )
         if proxy.is_reliable and not is_local:
             proxy.schedule.matched(now)
+        if self._repeats is not None and (position := self._repeats.position_of(data.guid)) is not None:
+            proxy.resume_sn = position.next_sn
         self.writers[data.guid] = proxy
         return proxy
 
@@ -283,6 +285,9 @@ class StatefulReader:
         if schedule.is_preemptive:
             return [proxy.preemptive_acknack(now)]
         may_repeat = schedule.may_repeat(now)
+        if may_repeat and proxy.resume_sn and proxy.will_not_repeat():
+            proxy.reorder.skip_to(proxy.resume_sn)
+            self._deliver(proxy, now)
         partial = self._partial_samples(proxy, remote)
         missing = proxy.missing_changes(excluded=partial, above=0 if may_repeat else schedule.asked_sn)
         silent = [

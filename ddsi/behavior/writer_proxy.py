@@ -22,6 +22,7 @@ from .transmissions import SendAckNack, SendNackFrag
 __all__ = ["WriterProxy"]
 
 _STALE_HEARTBEAT_S = 0.5
+_VAIN_REQUESTS = 3
 # These call an ACKNACK with base 0 preemptive; to all others base 0 is malformed.
 _BASE_ZERO_VENDORS = frozenset({FAST_DDS, RTI, RTI_MICRO, OPENDDS, TWINOAKS})
 
@@ -35,6 +36,8 @@ class WriterProxy:
 
     __slots__ = (
         "_acknack_count",
+        "_asked_in_vain",
+        "_asked_sn",
         "_heartbeat_count",
         "_heartbeat_time",
         "_nack_frag_count",
@@ -51,6 +54,7 @@ class WriterProxy:
         "locators",
         "needs_historical_data",
         "reorder",
+        "resume_sn",
         "schedule",
         "uses_filter",
     )
@@ -82,8 +86,11 @@ class WriterProxy:
         self.historical_sn = -1  # what the first HEARTBEAT said is there; -1: none came yet
         # HEARTBEATs one after the other that do not know what was already delivered; best effort: samples below it.
         self.contradictions = 0
+        # Where the reader had come when it lost this writer, which has returned; 0: it lost none, or is past it.
+        self.resume_sn = 0
         self.is_alive = True
         self.liveliness_due = math.inf
+        self._asked_sn = self._asked_in_vain = 0
         self._acknack_count = 0
         self._nack_frag_count = 0
         self._heartbeat_count = 0
@@ -164,6 +171,19 @@ class WriterProxy:
             self.schedule.missing(now, is_news=self.last_seq > self.schedule.asked_sn)
         elif not self.schedule.is_preemptive and not self.schedule.is_wanted:
             self.schedule.complete()
+
+    def will_not_repeat(self) -> bool:
+        """To be asked before each repeated request: has the writer left several for an old number unanswered?
+
+        A writer that never lost the reader remembers what that acknowledged, and some then send it no more, whatever is
+        asked for (Fast DDS): the reader goes on where it was.  Those who do are asked, as they may have begun anew.
+        """
+        if self.next_sn >= self.resume_sn:
+            self.resume_sn = 0
+            return False
+        self._asked_in_vain = self._asked_in_vain + 1 if self._asked_sn == self.next_sn else 1
+        self._asked_sn = self.next_sn
+        return self._asked_in_vain > _VAIN_REQUESTS
 
     def preemptive_acknack(self, now: float) -> SendAckNack:
         """Before the first HEARTBEAT: "here I am, what have you?", in the form that the writer's vendor takes.

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import pytest
 
+from ddsi.engine import Participant
+from ddsi.messages.acknack import AckNack
+from ddsi.messages.data import Data
+from ddsi.messages.heartbeat import Heartbeat
+from ddsi.messages.receiver import MessageReceiver
 from ddsi.simulation import Domain, LinkConditions, Node
-from ddsi.structure.qos import Qos
+from ddsi.structure.guid import EntityId
+from ddsi.structure.qos import Qos, reader_qos
 from ddsi.structure.qos_policies import KeepAll, KeepLast, Reliable, TransientLocal, Volatile
 from ddsi.structure.sample_info import InstanceState
+
+from .wire import Stranger, engine, sent
 
 LATE = Qos(reliability=Reliable(), history=KeepAll(), durability=TransientLocal())
 LEASE = 20.0
@@ -118,3 +126,50 @@ def test_an_instance_lives_again_with_its_writer() -> None:
     assert states == [InstanceState.NOT_ALIVE_NO_WRITERS, InstanceState.ALIVE]
     assert [info.valid_data for info, _ in reader.take()] == [False]
     assert instance.no_writers_generation_count == 1
+
+
+# --- writers that never lost the reader ------------------------------------------------------------------
+
+
+def application_data(stranger: Stranger, number: int) -> bytes:
+    writer_id = stranger.endpoint(1, is_writer=True).entity_id
+    return stranger.message(Data(EntityId.UNKNOWN, writer_id, number, None, b"\0\1\0\0octets\0\0").encode())
+
+
+def heartbeat(stranger: Stranger, last: int, count: int) -> bytes:
+    writer_id = stranger.endpoint(1, is_writer=True).entity_id
+    return stranger.message(Heartbeat(EntityId.UNKNOWN, writer_id, 1, last, count, final=False).encode())
+
+
+def requested(engine: Participant) -> list[int]:
+    """The lowest number that each ACKNACK to an application's writer wants."""
+    return [
+        submessage.reader_sn_state.base
+        for _, octets in sent(engine)
+        for submessage, _ in MessageReceiver(octets)
+        if isinstance(submessage, AckNack) and not submessage.writer_id.is_builtin
+    ]
+
+
+def test_one_that_does_not_repeat_what_was_acknowledged_holds_nothing_up() -> None:
+    """It is asked a few times, as it may have begun anew; then the reader goes on where it was."""
+    ours, stranger = engine(), Stranger()
+    reader = ours.create_reader("Square", "T", reader_qos(LATE), 0.0, is_keyed=False)
+    assert reader.history is not None
+    for now in (0.0, 30.0):
+        ours.handle_timeout(now)
+        stranger.introduce(ours, now)
+        ours.receive_datagram(Stranger().sedp_writer(qos=LATE), stranger.address, now)
+        if now == 0.0:
+            ours.receive_datagram(heartbeat(stranger, 0, 1), stranger.address, now)
+            for number in (1, 2, 3):
+                ours.receive_datagram(application_data(stranger, number), stranger.address, now)
+            assert len(reader.history.take()) == 3
+    for round_, now in enumerate((30.1, 30.3, 30.5, 30.7, 30.9, 31.1)):
+        ours.receive_datagram(heartbeat(stranger, 5, 2 + round_), stranger.address, now)
+        for number in (4, 5):
+            ours.receive_datagram(application_data(stranger, number), stranger.address, now)
+        ours.handle_timeout(now + 0.1)
+    assert [change.sequence_number for info, change in reader.history.take() if info.valid_data] == [4, 5]
+    asked = requested(ours)
+    assert (asked[0], asked[-1]) == (1, 6)
