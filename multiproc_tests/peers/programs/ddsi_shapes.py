@@ -6,6 +6,7 @@ The network comes from DDSI_URI.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from typing import Annotated, Any
 
@@ -228,6 +229,13 @@ async def watch_refusals(entity: Any) -> None:
             say("REVOKED", event.reason)
 
 
+async def tell_what_was_dropped(participant: ddsi.DomainParticipant) -> None:
+    """Whenever somebody asks by SIGUSR1."""
+    with trio.open_signal_receiver(signal.SIGUSR1) as requests:
+        async for _ in requests:
+            say("DROPPED", *(f"{reason}={count}" for reason, count in sorted(participant.drop_counts().items())))
+
+
 async def main() -> int:
     o = parse_arguments()
     try:
@@ -235,6 +243,7 @@ async def main() -> int:
             say("GUID", participant.guid.hex())
             async with trio.open_nursery() as nursery:
                 nursery.start_soon(watch_refusals, participant)
+                nursery.start_soon(tell_what_was_dropped, participant)
                 status = await play(o, participant, nursery)
                 nursery.cancel_scope.cancel()
             return status

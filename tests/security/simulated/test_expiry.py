@@ -103,7 +103,7 @@ def test_the_owner_is_told_what_ended_and_the_others_are_not(identities: list[Pr
 
 
 def test_who_is_out_stays_out_and_its_announcements_are_no_news(identities: list[Properties]) -> None:
-    """It goes on announcing itself, for ten minutes: the reason is told when it ends, and when it is first seen again."""
+    """It announces itself for ten minutes more: the reason is told when it ends, and when it is first seen again."""
     scene = Scene(identities)
     scene.domain.run(LIFE_S + 600.0)
     assert not has_admitted(scene.alice, scene.brief)
