@@ -94,10 +94,24 @@ def _markdown(
     if foreign := [pair for pair in pairs if OURS.name not in pair]:
         yield "\n## The others among themselves\n"
         yield from _table(outcomes, foreign)
+        yield from _in_their_place(outcomes)
     yield "\n## The cases\n"
     yield from (f"- **{case.name}**: {case.claim}." for case in cases if not case.name.endswith("-reversed"))
     yield from _reasons("What failed", outcomes, Verdict.FAILED)
     yield from _reasons("Known limits of the others", outcomes, Verdict.KNOWN)
+
+
+def _in_their_place(outcomes: Sequence[Outcome]) -> Iterable[str]:
+    """Is what two of the others manage, or one with itself, managed with ours in the place of either?"""
+    passed = {(o.case, o.publisher, o.subscriber) for o in outcomes if o.verdict is Verdict.PASSED}
+    managed = [one for one in passed if OURS.name not in one[1:]]
+    replaced = {one for case, pub, sub in managed for one in ((case, pub, OURS.name), (case, OURS.name, sub))}
+    lacking = sorted(replaced - passed)
+    yield (
+        f"\nThe others manage {len(managed)} of these. With ours in the place of the one or of the other, that makes "
+        f"{len(replaced)} different plays, of which {len(replaced) - len(lacking)} pass."
+    )
+    yield from (f"- {case}, {publisher} to {subscriber}: not with ours." for case, publisher, subscriber in lacking)
 
 
 def _table(outcomes: Sequence[Outcome], pairs: Sequence[tuple[str, str]]) -> Iterable[str]:

@@ -116,8 +116,14 @@ def _governance_cases() -> Iterator[Case]:
                 directions = _DIRECTIONS
             elif is_reversed == bool(number & 4):
                 directions = (_DIRECTIONS[number % 4],)
+            if governance in _QUICK_WITH_OURSELVES and not is_reversed:
+                directions += (("ddsi", "ddsi"),)
             story = deliver_to_newcomer if is_late else deliver
             yield _case(governance, claim, story, governance, is_reversed=is_reversed, quick=directions)
+
+
+_QUICK_WITH_OURSELVES = ("data", "metadata-sign-data", "rtps-sign", "all-origin")
+"""What we could get wrong in the same way on both sides, and a capture would show."""
 
 
 def _brief(kind: str) -> str:
