@@ -61,9 +61,11 @@ class Pair:
     is_open: bool = False
     remote_entity: bytes = b""
     """Its entity id."""
+    is_volatile: bool = False
 
     def __post_init__(self) -> None:
         self.remote_entity = bytes(self.remote[12:])
+        self.is_volatile = self.local.is_volatile
 
 
 class Outbox(Protocol):

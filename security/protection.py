@@ -191,7 +191,7 @@ class Protection:
         remote.opened += 1
         if not self._speaks_for_itself(plain, pair):
             return Rejected(f"it was protected by {pair.remote}, and speaks for another")
-        if pair.local.is_volatile and remote.handshake is not None:
+        if pair.is_volatile and remote.handshake is not None:
             # Only who shares the secret can have said that.  A peer may have no key for us (OpenDDS), but it answers.
             remote.handshake.confirm()
         return plain
@@ -204,7 +204,7 @@ class Protection:
         if start is None:
             return plain[0] == _INFO_TS
         named = plain[start : start + 4]
-        if pair.local.is_volatile:  # one key protects both directions' submessages
+        if pair.is_volatile:  # one key protects both directions' submessages
             return bytes(named) in NEVER_IN_MESSAGES and named[0] == 0xFF
         return named == pair.remote_entity
 

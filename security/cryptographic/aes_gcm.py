@@ -49,16 +49,21 @@ def append_encrypted(buffer: bytearray, plain: Octets, aead: AESGCM, nonce: byte
     return tag
 
 
-def decrypt_joined(aead: AESGCM, nonce: bytes, encrypted: Octets, tag: bytes) -> bytes | bytearray:
-    """What ``encrypted`` holds, whose ``tag`` lies elsewhere; a bytearray if it is large.
+def decrypt_joined(aead: AESGCM, nonce: bytes, octets: Octets, start: int, end: int, tag: bytes) -> bytes | bytearray:
+    """What ``octets[start:end]`` hold, whose ``tag`` lies elsewhere; a bytearray if it is large.
 
-    Raises cryptography's InvalidTag.
+    If it is large, and ``octets`` can be written to, the tag is put where it belongs, over what follows.  Raises
+    cryptography's InvalidTag.
     """
-    sealed = b"".join((encrypted, tag))
-    if len(encrypted) < LARGE:
-        return aead.decrypt(nonce, sealed, None)
+    if end - start < LARGE:
+        return aead.decrypt(nonce, b"".join((octets[start:end], tag)), None)
+    if isinstance(octets, memoryview) and not octets.readonly and len(octets) >= end + _TAG_LENGTH:
+        octets[end : end + _TAG_LENGTH] = tag
+        sealed: Octets = octets[start : end + _TAG_LENGTH]
+    else:
+        sealed = b"".join((octets[start:end], tag))
     if not _HAS_INTO:
         return bytearray(aead.decrypt(nonce, sealed, None))
-    plain = bytearray(len(encrypted))
+    plain = bytearray(end - start)
     aead.decrypt_into(nonce, sealed, None, plain)
     return plain

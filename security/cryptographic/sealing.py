@@ -32,7 +32,7 @@ def seal_submessage(
     buffer: bytearray, submessage: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
 ) -> Refused | None:
     """Append a submessage, protected.  Its length must be filled in: it is no longer the last of a message."""
-    return _seal(SUBMESSAGE, buffer, submessage, key, receivers)
+    return _seal(SUBMESSAGE, buffer, b"", submessage, key, receivers)
 
 
 def seal_message(
@@ -42,17 +42,22 @@ def seal_message(
     start = len(buffer)
     buffer += message[:HEADER_LENGTH]
     rest = message[4:] if len(message) < LARGE else memoryview(message)[4:]
-    refused = _seal(MESSAGE, buffer, b"".join((_INFO_SRC_HEAD, rest)), key, receivers)
+    refused = _seal(MESSAGE, buffer, _INFO_SRC_HEAD, rest, key, receivers)
     if refused is not None:
         del buffer[start:]
     return refused
 
 
 def _seal(
-    envelope: Envelope, buffer: bytearray, plain: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
+    envelope: Envelope,
+    buffer: bytearray,
+    head: bytes,
+    body: Octets,
+    key: SendingKey,
+    receivers: Sequence[ReceiverKey],
 ) -> Refused | None:
-    """Append ``plain``, protected."""
-    length = len(plain)
+    """Append ``head`` and ``body``, protected as one."""
+    length = len(head) + len(body)
     if key.encrypts:
         if length > LONGEST_BODY - 4:
             return Refused(f"{length} octets do not fit into one SEC_BODY")
@@ -65,22 +70,24 @@ def _seal(
         return USED_UP
     nonce = header[NONCE_AT:]
     if not key.encrypts:
-        mac = key.aead.encrypt(nonce, b"", plain)
-        buffer += envelope.prefix_head + header
-        buffer += plain
+        buffer += envelope.prefix_head + header + head
+        buffer += body
+        with memoryview(buffer) as view, view[-length:] as signed:
+            mac = key.aead.encrypt(nonce, b"", signed)
     elif length < LARGE:
-        sealed = key.aead.encrypt(nonce, plain, None)
+        sealed = key.aead.encrypt(nonce, head + body if head else body, None)
         mac = sealed[-MAC_LENGTH:]
         buffer += b"".join((envelope.prefix_head, header, _body_head(length), sealed[:-MAC_LENGTH]))
     else:
         buffer += envelope.prefix_head + header + _body_head(length)
         spare = FOOTER_LENGTH + RECEIVER_MAC_LENGTH * len(receivers) + 8
+        plain = b"".join((head, body)) if head else body
         mac = append_encrypted(buffer, plain, key.aead, nonce, spare=spare)
     if not receivers:
         buffer += _PADDING[length & 3] + envelope.postfix_head + mac + _NO_MACS
         return None
-    head, count = _postfix_head(envelope, len(receivers))
-    parts = [_PADDING[length & 3], head, mac, count]
+    postfix_head, count = _postfix_head(envelope, len(receivers))
+    parts = [_PADDING[length & 3], postfix_head, mac, count]
     for receiver in receivers:
         parts += receiver.key_id, receiver.mac(key, nonce, mac)
     buffer += b"".join(parts)

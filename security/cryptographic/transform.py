@@ -146,7 +146,7 @@ class AesGcmGmacTransform:
             if key_id == NO_KEY_ID:
                 return _volatile(remote)
             senders = remote.senders.get(key_id)
-            if not senders:
+            if senders is None:
                 return NoKeys(key_id)
             sender = senders[0] if len(senders) == 1 else _addressed(senders, key_id, encoded_rtps_submessage)
         except MalformedMessage as error:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from ddsi.spi import NoKeys, Octets, Outcome, Rejected
 from ddsi_security.cryptographic import opening, payload
 from ddsi_security.cryptographic.aes_gcm import LARGE
+from ddsi_security.cryptographic.envelope import SUBMESSAGE
 from ddsi_security.cryptographic.sealing import seal_message, seal_submessage
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from tests.security.cryptographic import vectors
@@ -131,6 +132,22 @@ def test_any_octets_have_an_outcome(octets: bytes, open_it: Opener, plain: bytes
         mutant[start:end] = data.draw(st.binary(max_size=24) | st.just(bytes(mutant[start:end] * 2)))
     found = open_it(bytes(mutant))
     assert isinstance(found, Rejected | NoKeys) or found == plain
+
+
+@given(data=st.data())
+def test_the_short_way_opens_what_the_general_one_opens(data: st.DataObject) -> None:
+    """And nothing else.  It is for keys and sessions that were used before."""
+    keys, expected = ring(material(GCM)), Protection(encrypted=True)
+    genuine = vectors.HEARTBEAT_ENCRYPTED
+    assert opening.open_submessage(genuine, keys, expected) == vectors.HEARTBEAT
+    assert opening._open_usual(genuine, keys, expected) == vectors.HEARTBEAT
+    mutant = bytearray(genuine)
+    for _ in range(data.draw(st.integers(1, 3))):
+        start = data.draw(st.integers(0, len(mutant)))
+        end = min(start + data.draw(st.integers(0, 8)), len(mutant))
+        mutant[start:end] = data.draw(st.binary(max_size=8) | st.just(bytes(mutant[start:end] * 2)))
+    short = opening._open_usual(bytes(mutant), keys, expected)
+    assert short is None or short == opening._open(SUBMESSAGE, bytes(mutant), 0, keys, expected)
 
 
 @given(st.binary(max_size=300))
