@@ -1,6 +1,7 @@
 """``ddsi sim``: a domain of engines over a simulated network and clock; the same seed does the same, always.
 
-``ddsi sim handshake`` walks through the meeting of two secured participants (:mod:`.sim_handshake`).
+``ddsi sim handshake`` walks through the meeting of two secured participants (:mod:`.sim_handshake`).  In both, every
+second participant may play another vendor's (:mod:`ddsi.simulation.vendors`).
 
 Without a scenario's name, the seed makes its own: participants, endpoints, weather, crashes.  Every run checks the
 invariants of ``ddsi.simulation``; one that fails tells how to have it again.
@@ -10,11 +11,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 from dataclasses import asdict
 from json import dumps
 
-from ..simulation import Domain, SimulationStuck, invariants
+from ..simulation import VENDORS, Domain, SimulationStuck, Vendor, invariants
 from ..simulation.scenario import Failure, Scenario
 from ..trace.event import TraceEvent
 from ..trace.sequence_diagram import DEFAULT_CATEGORIES, sequence_diagram
@@ -30,6 +30,8 @@ __all__ = ["SUMMARY", "add_arguments", "run"]
 
 SUMMARY = "run a scenario over a simulated network, from a seed"
 
+VENDORS_BY_NAME = {vendor.name.lower().replace(" ", "-"): vendor for vendor in VENDORS}
+_Vendors = tuple[Vendor | None, ...]
 _HANDSHAKE = "handshake"
 _REST_S = 60.0
 _HIGHEST_SEED = (1 << 63) - 1
@@ -47,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--list", action="store_true", help="name the scenarios and end")
     parser.add_argument("--count", type=count, default=1, metavar="N", help="so many seeds, from --seed upwards")
+    parser.add_argument("--vendor", choices=tuple(VENDORS_BY_NAME), metavar="NAME",
+                        help=f"every second participant plays {', '.join(VENDORS_BY_NAME)}")  # fmt: skip
     parser.add_argument("--plan", action="store_true", help="say what the seed's own scenario will do, and end")
     parser.add_argument("--diagram", action="store_true", help="draw everything that happens")
     parser.add_argument("--only", type=categories, default=DEFAULT_CATEGORIES, metavar="NAMES",
@@ -86,8 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _walk(arguments: argparse.Namespace) -> int:
     others = (arguments.list, arguments.plan, arguments.diagram, arguments.trace, arguments.json)
     if any(others) or arguments.count > 1 or arguments.scenario != RANDOM:
-        raise CommandError("of the options for scenarios, ddsi sim handshake takes --seed alone")
-    return sim_handshake.run(arguments)
+        raise CommandError("of the options for scenarios, ddsi sim handshake takes --seed and --vendor alone")
+    return sim_handshake.run(arguments, VENDORS_BY_NAME.get(arguments.vendor))
 
 
 def _list() -> int:
@@ -108,11 +112,12 @@ def _run_seed(arguments: argparse.Namespace, seed: int) -> bool:
     """Run it, draw what is wanted also of a run that fails, and say how it went; True if all held."""
     events: list[TraceEvent] = []
     sink: TraceSink | None = events.append if arguments.diagram or arguments.trace else None
-    play = _play_random if arguments.scenario == RANDOM else _named(SCENARIOS[arguments.scenario])
+    scenario = None if arguments.scenario == RANDOM else SCENARIOS[arguments.scenario]
+    vendors = (None, VENDORS_BY_NAME[arguments.vendor]) if arguments.vendor else (None,)
     flaws: list[str] = []
     outcome: dict[str, object] = {}
     try:
-        outcome = play(seed, sink)
+        outcome = _play_random(seed, vendors, sink) if scenario is None else _play(scenario, seed, vendors, sink)
     except Failure as failure:
         flaws = failure.flaws
     except SimulationStuck as stuck:
@@ -125,28 +130,26 @@ def _run_seed(arguments: argparse.Namespace, seed: int) -> bool:
     return not flaws
 
 
-def _play_random(seed: int, sink: TraceSink | None) -> dict[str, object]:
-    report = Scenario.from_seed(seed).run(sink)
+def _play_random(seed: int, vendors: _Vendors, sink: TraceSink | None) -> dict[str, object]:
+    report = Scenario.from_seed(seed).run(sink, vendors=vendors)
     return {**asdict(report), "text": str(report)}
 
 
-def _named(scenario: NamedScenario) -> Callable[[int, TraceSink | None], dict[str, object]]:
-    def play(seed: int, sink: TraceSink | None) -> dict[str, object]:
-        domain = Domain(seed, conditions=scenario.conditions, trace=sink)
-        flaws = scenario.play(domain)
-        if not flaws and not domain.run_until(lambda: invariants.is_at_rest(domain), _REST_S):
-            flaws = ["it does not come to rest"]
-        flaws += invariants.at_rest(domain) if not flaws else invariants.always(domain)
-        if flaws:
-            raise Failure(seed, scenario.name, flaws)
-        text = f"seed {seed}, {scenario.name}: {domain.now:.1f} s of virtual time; every invariant held"
-        return {"seed": seed, "seconds": domain.now, "text": text}
-
-    return play
+def _play(scenario: NamedScenario, seed: int, vendors: _Vendors, sink: TraceSink | None) -> dict[str, object]:
+    domain = Domain(seed, conditions=scenario.conditions, vendors=vendors, trace=sink)
+    flaws = scenario.play(domain)
+    if not flaws and not domain.run_until(lambda: invariants.is_at_rest(domain), _REST_S):
+        flaws = ["it does not come to rest"]
+    flaws += invariants.at_rest(domain) if not flaws else invariants.always(domain)
+    if flaws:
+        raise Failure(seed, scenario.name, flaws)
+    text = f"seed {seed}, {scenario.name}: {domain.now:.1f} s of virtual time; every invariant held"
+    return {"seed": seed, "seconds": domain.now, "text": text}
 
 
 def _say(arguments: argparse.Namespace, seed: int, outcome: dict[str, object], flaws: list[str]) -> None:
     chosen = "" if arguments.scenario == RANDOM else f" --scenario {arguments.scenario}"
+    chosen += f" --vendor {arguments.vendor}" if arguments.vendor else ""
     replay = f"ddsi sim --seed {seed}{chosen}"
     if arguments.json:
         details = {name: value for name, value in outcome.items() if name not in ("seed", "text")}

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..config.secure import secure
+from ..simulation import Vendor
 from ..structure.qos_policies import Properties
 from .command_line import main
 from .exit_status import CommandError, ExitStatus
@@ -50,12 +51,16 @@ def _dropped(text: str) -> str | int:
     return name
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Walk, and say at the end what became of the message that was lost; the status tells whether it was repaired."""
+def run(arguments: argparse.Namespace, vendor: Vendor | None) -> int:
+    """Walk, and say at the end what became of the message that was lost; the status tells whether it was repaired.
+
+    ``vendor``: whom the second of the two plays, if not us.
+    """
     with _identities(arguments.keystore) as identities:
         walk = Walk(
             identities,
             seed=arguments.seed,
+            vendor=vendor,
             dropped=arguments.drop,
             started_ns=arguments.wall_clock(),
             width=terminal_width(),

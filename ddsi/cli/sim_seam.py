@@ -51,12 +51,16 @@ class WatchedHooks:
     """Stands for ``hooks``; all that it does not name itself goes straight to them.
 
     ``moved(before, after, cause)`` is called when the handshake with the peer goes on.  ``cause``, in words: a message
-    that came, the timer, the peer's announcement; whatever is sent next has the same.
+    that came, the timer, the peer's announcement; whatever is sent next has the same.  ``teller``: who knows how far it
+    is, where something stands between.
     """
 
-    def __init__(self, hooks: SecurityHooks, moved: Callable[[Enum | None, Enum, str], None]) -> None:
+    def __init__(
+        self, hooks: SecurityHooks, moved: Callable[[Enum | None, Enum, str], None], *, teller: object = None
+    ) -> None:
         self.cause = ""
         self._hooks = hooks
+        self._teller = hooks if teller is None else teller
         self._moved = moved
         self._peer: GuidPrefix | None = None
         self._state: Enum | None = None
@@ -91,9 +95,9 @@ class WatchedHooks:
         self._look()
 
     def _look(self) -> None:
-        if self._peer is None or not isinstance(self._hooks, HandshakeTeller):
+        if self._peer is None or not isinstance(self._teller, HandshakeTeller):
             return
-        state = self._hooks.handshake_state(self._peer)
+        state = self._teller.handshake_state(self._peer)
         if state is not None and state is not self._state:
             before, self._state = self._state, state
             self._moved(before, state, self.cause)

@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import cast
 
+from ..config import Config
 from ..messages.acknack import AckNack
 from ..messages.heartbeat import Heartbeat
-from ..simulation import Domain, LinkConditions
+from ..simulation import Domain, LinkConditions, Node, Vendor
+from ..simulation.vendor_hooks import VendorHooks
 from ..spi import SecurityHooks, load_hooks
 from ..structure import builtin_entity_ids as ids
 from ..structure.guid import EntityId, Guid, GuidPrefix
@@ -67,13 +69,15 @@ class _Loss:
 
 class Walk:
     """``identities``: the security properties of two participants, by name.  ``dropped``: a kind of message by its
-    name, or a message by its number.  ``pause()`` is called between datagrams until it is False."""
+    name, or a message by its number.  ``vendor``: whom the second plays.
+    ``pause()`` is called between datagrams until it is False."""
 
     def __init__(
         self,
         identities: dict[str, Properties],
         *,
         seed: int,
+        vendor: Vendor | None,
         dropped: str | int | None,
         started_ns: int,
         width: int,
@@ -81,6 +85,7 @@ class Walk:
         pause: Callable[[], bool] | None,
     ) -> None:
         self._dropped = dropped
+        self._vendor = vendor
         self._width = width
         self._arrow, self._cross, self._clause = ("->", "x", "clause ") if ascii_only else ("→", "✗", "§")
         self._pause = pause
@@ -94,11 +99,11 @@ class Walk:
         self._lost: set[tuple[object, ...]] = set()
         self._domain = Domain(seed, conditions=LinkConditions(delay=_DELAY_S), trace=self._notice)
         self._domain.network.loses = lambda sender, receiver, octets: True  # until both are there
-        for name, properties in identities.items():
-            self._join(name, properties, started_ns)
+        for (name, properties), played in zip(identities.items(), (None, vendor), strict=True):
+            self._join(name, properties, started_ns, played)
         self._domain.network.loses = self._sent
 
-    def _join(self, name: str, properties: Properties, started_ns: int) -> None:
+    def _join(self, name: str, properties: Properties, started_ns: int, vendor: Vendor | None) -> None:
         side: _Side
 
         def moved(before: Enum | None, after: Enum, cause: str) -> None:
@@ -112,11 +117,19 @@ class Walk:
             entropy=self._domain.dice.fork().octets,
             wall_clock=lambda: started_ns + int(self._domain.now * 1e9),
         )
-        side = _Side(name, WatchedHooks(inner, moved))
-        hooks = cast(SecurityHooks, side.hooks)  # what it does not name itself, it passes on
+        # What is watched is what leaves at last, quirks and all.  Either passes on what it does not name itself.
+        played = VendorHooks(inner, vendor.quirks if vendor is not None else ())
+        side = _Side(name, WatchedHooks(cast(SecurityHooks, played), moved, teller=inner))
+        hooks = cast(SecurityHooks, side.hooks)
         node = self._domain.node(
-            name=name, properties=properties, make_hooks=lambda: hooks, max_message_octets=_LARGEST_MESSAGE
+            name=name,
+            config=vendor.config(Config()) if vendor is not None else None,
+            properties=properties,
+            make_hooks=lambda: hooks,
+            max_message_octets=_LARGEST_MESSAGE,
         )
+        node.played = played
+        played.joined(node.engine)
         self._sides[node.guid.prefix] = side
 
     # --- the walk ----------------------------------------------------------------------------------------
@@ -128,6 +141,8 @@ class Walk:
         for node in (lower, higher):
             self._tell(f"{node.name} is {node.guid}")
         self._tell(f"{lower.name} has the lower Guid and begins (§8.3.2.11.3).  Clauses are of DDS-Security 1.1.")
+        if self._vendor is not None:
+            self._tell(f"{second.name} plays {self._vendor.name} by its quirks.")
         writer = first.writer(_TOPIC, _QOS)
         reader = second.reader(_TOPIC, _QOS)
         is_matched = self._live(lambda: bool(writer.matched_count and reader.matched_count))
@@ -138,6 +153,9 @@ class Walk:
         if loss is not None and loss.message.is_reliable:
             is_done = is_done and self._live(lambda: loss.repeated_at is not None)
         self._live(lambda: False, _AFTERMATH_S)
+        self._tell("")
+        if self._vendor is not None:
+            self._tell_quirks(second)
         return self._conclude(is_done)
 
     def _live(self, condition: Callable[[], bool], limit_s: float = _LIMIT_S) -> bool:
@@ -147,8 +165,13 @@ class Walk:
 
         return self._domain.run_until(is_over, limit_s)
 
+    def _tell_quirks(self, node: Node) -> None:
+        """Those that had something to do, as they stand in ``ddsi.simulation.quirks``."""
+        acts = node.played.acts if node.played is not None else {}
+        told = ", ".join(f"{quirk.__name__} {count}" for quirk, count in acts.items() if count)
+        self._tell(f"What {node.name} did otherwise than we do, and how often: {told or 'nothing'}.")
+
     def _conclude(self, is_done: bool) -> bool:
-        self._tell("")
         if not is_done:
             missing = "no sample has crossed" if self._loss is None else "what was lost is not repaired"
             self._tell(f"After {self._domain.now:g} s {missing}.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from ..config import Config
 from ..discovery.matching import judge
@@ -28,16 +28,24 @@ class Domain:
     domain.run(3)
     writer.write()
     domain.run_until(lambda: len(reader.taken) == 1, 5)
+
+    Participants play the ``vendors`` by turns, None for ours, unless they are told otherwise.
     """
 
     def __init__(
-        self, seed: int = 0, *, conditions: LinkConditions = GOOD_WEATHER, trace: TraceSink | None = None
+        self,
+        seed: int = 0,
+        *,
+        conditions: LinkConditions = GOOD_WEATHER,
+        vendors: Sequence[Vendor | None] = (None,),
+        trace: TraceSink | None = None,
     ) -> None:
         self.seed = seed
         self.dice = Dice(seed)
         self.network = Network(self.dice.fork(), conditions, trace=trace)
         self.nodes: list[Node] = []
         self._trace = trace
+        self._vendors = tuple(vendors)
         self._indices: dict[str, int] = {}
 
     def __repr__(self) -> str:
@@ -80,7 +88,7 @@ class Domain:
             clock_error=clock_error,
             properties=properties or {},
             make_hooks=make_hooks,
-            vendor=vendor,
+            vendor=vendor or self._vendors[number % len(self._vendors)],
         )
         node = Node(setup, self.network, self.dice.fork(), self._trace)
         self.nodes.append(node)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ..engine import Participant
 
 __all__ = [
+    "AckNackCountZero",
     "AckNackFromZero",
     "BigEndianEnvelopes",
     "BigEndianSubmessages",
@@ -64,6 +65,8 @@ _PLAIN_READERS_AND_WRITERS = frozenset(
         *(ids.SEDP_PUBLICATIONS_READER, ids.SEDP_PUBLICATIONS_WRITER),
         *(ids.SEDP_SUBSCRIPTIONS_READER, ids.SEDP_SUBSCRIPTIONS_WRITER),
         *(ids.PARTICIPANT_MESSAGE_READER, ids.PARTICIPANT_MESSAGE_WRITER),
+        *(ids.TYPE_LOOKUP_REQUEST_READER, ids.TYPE_LOOKUP_REQUEST_WRITER),
+        *(ids.TYPE_LOOKUP_REPLY_READER, ids.TYPE_LOOKUP_REPLY_WRITER),
     }
 )
 _BYTE_ORDER_FREE = frozenset({ParameterId.KEY_HASH, ParameterId.STATUS_INFO})
@@ -164,6 +167,15 @@ class DisposeByKeyHash(Quirk):
         return replace(submessage, serialized_payload=b"", is_key=False)
 
 
+class AckNackCountZero(Quirk):
+    """ "What have you?" is an ACKNACK with count 0, again and again, where counts ascend (RTPS 2.5 §8.3.8.1.3)."""
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        if isinstance(submessage, AckNack) and submessage.reader_sn_state == NumberSet(1) and not submessage.final:
+            return replace(submessage, count=0)
+        return submessage
+
+
 class RefusesAckNackFromZero(Quirk):
     """Base 0 is malformed, unless one of the vendors sent it that are known for it."""
 
@@ -252,7 +264,7 @@ class LengthlessPostfix(Quirk):
 
 
 class PlainTopicsInClear(Quirk):
-    """Discovery and liveliness on the plain builtin topics leave unprotected, though messages are to be protected."""
+    """What the plain builtin topics carry leaves unprotected, though messages are to be protected (§8.4.2.4)."""
 
     def bares(self, receiver: Guid) -> bool:
         return receiver.entity_id in _PLAIN_READERS_AND_WRITERS

@@ -358,11 +358,11 @@ class _Run:
     ) -> None:
         self._scenario = scenario
         self._dice = Dice(scenario.seed ^ 0x5EED)
-        self._domain = Domain(scenario.seed, conditions=scenario.conditions, trace=trace)
+        self._domain = Domain(scenario.seed, conditions=scenario.conditions, vendors=vendors, trace=trace)
         self._plans: dict[int, list[EndpointPlan]] = {}
         self._introduction_s = _SECURED_INTRODUCTION_S if any(properties) else _INTRODUCTION_S
         hosts = tuple(dict.fromkeys(scenario.hosts))
-        for host, config, own, vendor in zip(scenario.hosts, scenario.configs, cycle(properties), cycle(vendors)):
+        for host, config, own in zip(scenario.hosts, scenario.configs, cycle(properties)):
             self._domain.node(
                 address=host,
                 config=config,
@@ -370,7 +370,6 @@ class _Run:
                 peers=() if scenario.multicast else hosts,
                 max_message_octets=scenario.max_message_octets,
                 properties=own,
-                vendor=vendor,
             )
 
     def run(self) -> Report:

@@ -71,8 +71,8 @@ class VendorHooks:
         return effect
 
     def opens_after_joining(self, reader: Guid) -> bool:
-        seals = [self._acts(quirk, quirk.seals_before_cutting) for quirk in self._quirks]
-        return any(seals) or self._hooks.opens_after_joining(reader)
+        seals = any(quirk.seals_before_cutting for quirk in self._quirks)
+        return seals or self._hooks.opens_after_joining(reader)
 
     def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
         said = self._said(sender, receivers, b"".join(submessage))
@@ -90,7 +90,8 @@ class VendorHooks:
         submessage = decode_submessage(raw)
         for quirk in self._quirks:
             said = quirk.say(sender, receivers, submessage)
-            self._acts(quirk, said is not submessage or not quirk.little_endian)
+            is_sealed_part = quirk.seals_before_cutting and isinstance(submessage, DataFrag)
+            self._acts(quirk, said is not submessage or not quirk.little_endian or is_sealed_part)
             if said is None:
                 return b""
             submessage = said

@@ -12,6 +12,7 @@ from ..config import Config
 from ..structure import vendor as ids
 from ..structure.vendor import VendorId, vendor_name
 from .quirks import (
+    AckNackCountZero,
     AckNackFromZero,
     BigEndianEnvelopes,
     DisposeByKeyHash,
@@ -54,9 +55,11 @@ class Vendor:
         return replace(config, vendor_id=self.vendor_id, fragment_size=self.fragment_size or config.fragment_size)
 
 
-CYCLONE_DDS = Vendor(ids.CYCLONE, (HeartbeatForAll, GapWhenAsked, RefusesAckNackFromZero, PlainTopicsInClear))
+CYCLONE_DDS = Vendor(
+    ids.CYCLONE, (AckNackCountZero, RefusesAckNackFromZero, HeartbeatForAll, GapWhenAsked, PlainTopicsInClear)
+)
 DUST_DDS = Vendor(ids.DUST_DDS, (DropsCountZero,))
-FAST_DDS = Vendor(ids.FAST_DDS, (AckNackFromZero, VendorSubmessageBehind, KeysForEverybody))
+FAST_DDS = Vendor(ids.FAST_DDS, (AckNackFromZero, DisposeByKeyHash, VendorSubmessageBehind, KeysForEverybody))
 OPENDDS = Vendor(
     ids.OPENDDS,
     (
@@ -66,11 +69,10 @@ OPENDDS = Vendor(
         BigEndianEnvelopes,
         LengthlessPostfix,
         NoParticipantTokens,
-        AckNackFromZero,
     ),
     has_origin_authentication=False,
 )
 RTI_CONNEXT = Vendor(ids.RTI, (AckNackFromZero, DisposeByKeyHash))
-RUST_DDS = Vendor(ids.RUST_DDS, (DropsCountZero,), fragment_size=256)
+RUST_DDS = Vendor(ids.RUST_DDS, (), fragment_size=256)
 
 VENDORS = (CYCLONE_DDS, DUST_DDS, FAST_DDS, OPENDDS, RTI_CONNEXT, RUST_DDS)

@@ -10,6 +10,7 @@ import pytest
 from ddsi.cli import main
 from ddsi.cli.sim_scenarios import RANDOM, SCENARIOS, NamedScenario
 from ddsi.simulation import Domain, LinkConditions
+from ddsi.structure.vendor import vendor_name
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -57,6 +58,20 @@ def test_the_trace_can_be_drawn_later(tmp_path: Path, capsys: pytest.CaptureFixt
     assert outcome.startswith("seed 2, fragments")
     assert main(["trace", str(path)]) == 0
     assert capsys.readouterr().out.splitlines() == drawn
+
+
+def test_every_second_participant_may_play_a_vendor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace = tmp_path / "trace.jsonl"
+    words = ["sim", "--scenario", "lossy-link", "--seed", "3", "--vendor", "fast-dds"]
+    assert main([*words, "--trace", str(trace)]) == 0
+    created = [json.loads(line) for line in trace.read_text().splitlines() if "participant_created" in line]
+    assert [vendor_name(bytes.fromhex(event["vendor_id"])) for event in created] == ["ddsi", "Fast DDS"]
+    assert main(["sim", "--seed", "4", "--count", "2", "--vendor", "opendds", "--json"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert json.loads(lines[-1])["replay"] == "ddsi sim --seed 5 --vendor opendds"
+    with pytest.raises(SystemExit):
+        main(["sim", "--vendor", "nobody"])
+    assert "rustdds" in capsys.readouterr().err
 
 
 def test_json_and_several_seeds(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ddsi.cli import main, sim_handshake
+from ddsi.cli.sim import VENDORS_BY_NAME
 from ddsi.cli.sim_handshake_words import KINDS
 
 pytest.importorskip("cryptography")
@@ -97,6 +98,16 @@ def test_a_message_is_lost_by_its_number_too(keystore: Path, capsys: pytest.Capt
     assert f"keys of a writer for Square: {number} again, which was lost" in said
 
 
+@pytest.mark.parametrize("vendor", VENDORS_BY_NAME)
+def test_the_second_may_play_a_vendor(vendor: str, keystore: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The walk sees what that one says, and what of it is not as we say it."""
+    said = walked(keystore, capsys, "--vendor", vendor)
+    assert f"bob plays {VENDORS_BY_NAME[vendor].name} by its quirks." in said
+    assert "bob       has the sample of Square" in said
+    assert ("BigEndianEnvelopes" in said) is (vendor == "opendds")
+    assert "Lost: " in walked(keystore, capsys, "--vendor", vendor, "--drop", "final")
+
+
 def test_what_is_never_sent_is_never_lost(keystore: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "No message 999 was sent" in walked(keystore, capsys, "--drop", "999", status=1)
 
@@ -144,8 +155,8 @@ def _answers(*answers: str) -> Iterator[str]:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["handshake", "--count", "2"], "takes --seed alone"),
-        (["handshake", "--json"], "takes --seed alone"),
+        (["handshake", "--count", "2"], "takes --seed and --vendor alone"),
+        (["handshake", "--json"], "takes --seed and --vendor alone"),
         (["--drop", "reply"], "--drop, --step and --keystore are for ddsi sim handshake"),
         (["handshake", "--keystore", "/nowhere"], "no keystore with two identities"),
     ],

@@ -66,6 +66,13 @@ def test_what_have_you_has_base_zero_and_a_request_keeps_its_own() -> None:
         assert said(quirk, other) is other
 
 
+def test_what_have_you_has_count_zero() -> None:
+    quirk = q.AckNackCountZero(PLAINTEXT)
+    assert said(quirk, acknack(1, count=7)) == acknack(1, count=0)
+    for other in (acknack(1, 1, count=7), acknack(2, count=7), AckNack(READER_ID, WRITER_ID, NumberSet(1), 7, True)):
+        assert said(quirk, other) is other
+
+
 def test_a_gap_is_said_when_it_is_asked_for_again() -> None:
     quirk, gap = q.GapWhenAsked(PLAINTEXT), Gap(READER_ID, WRITER_ID, 3, NumberSet(5))
     assert said(quirk, gap) is None
@@ -193,7 +200,7 @@ def test_reliable_samples_arrive_both_ways(vendor: Vendor, seed: int) -> None:
     for quirk in vendor.quirks:
         if quirk in (q.DropsCountZero, q.RefusesAckNackFromZero, q.OpensAfterJoining):
             assert other.played.acts[quirk] == 0, "we say nothing that this vendor does not understand"
-        elif quirk in (q.AckNackFromZero, q.DisposeByKeyHash, q.VendorSubmessageBehind):
+        elif quirk in (q.AckNackCountZero, q.AckNackFromZero, q.DisposeByKeyHash, q.VendorSubmessageBehind):
             assert other.played.acts[quirk] > 0
 
 
