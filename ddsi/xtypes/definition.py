@@ -108,8 +108,6 @@ class _MemberSearch:
             if any(field.name == member.name for member in inherited):
                 raise self._refusal(field.name, "its base has a member of that name")
             members.append(self._member(field, annotations[field.name], resolver, members))
-        if not any(member.is_serialized for member in members):
-            raise BadParameter(f"{self._class.__name__}: a struct has one member at least")
         self._frame = None  # not needed any more, and it would keep the function's locals alive
         return tuple(members)
 

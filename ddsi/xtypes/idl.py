@@ -15,10 +15,11 @@ and ``idl.sequence[T]`` is ``Sequence[T]``, which for octets ``bytes`` fulfils a
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, field
 from enum import IntEnum, IntFlag
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
 
 from ..structure.errors import BadParameter
 from . import model
@@ -26,14 +27,21 @@ from .annotations import Array, Bits, Bound, CaseLabels, ElementOf, Flag, HashId
 from .bitsets import define_bitset
 from .definition import define_struct
 from .enumerations import describe_bitmask, describe_enum
+from .idl_compiler import IdlError, IdlWarning
 from .model import Extensibility
+from .resolution import named_type
 from .unions import define_union, selected_member
+
+if TYPE_CHECKING:
+    from .idl_compiler.loading import Namespace
 
 __all__ = [
     "APPENDABLE",
     "FINAL",
     "MUTABLE",
     "Extensibility",
+    "IdlError",
+    "IdlWarning",
     "array",
     "array_of",
     "bitmask",
@@ -54,6 +62,8 @@ __all__ = [
     "int32",
     "int64",
     "key",
+    "load",
+    "loads",
     "map",
     "must_understand",
     "name",
@@ -65,6 +75,7 @@ __all__ = [
     "sequence_of",
     "struct",
     "switch",
+    "to_idl",
     "uint8",
     "uint16",
     "uint32",
@@ -321,3 +332,47 @@ def bitmask(*, typename: str | None = None, bit_bound: int = 32) -> Callable[[ty
         return python_class
 
     return decorate
+
+
+def load(
+    path: str | Path,
+    *,
+    include: Sequence[str | Path] = (),
+    defines: Mapping[str, str] | None = None,
+    default_extensibility: Extensibility = Extensibility.APPENDABLE,
+) -> Namespace:
+    """The types of an IDL file (OMG IDL 4.2), ready for use: ``load("shapes.idl").geometry.Point(1, 2)``.
+
+    The result has an attribute for each type and constant, and for each module one that has its own.  ``include``
+    are the folders where ``#include`` looks, behind the file's own; ``defines`` macros that are there from the start;
+    ``default_extensibility`` holds where the text says none (other compilers: final, for instance, in Cyclone DDS's).
+    What was left out, such as unknown annotations, is told in its ``idl_warnings``.
+
+    Raises IdlError, with file, line, column and what was expected; OSError if the file cannot be read.
+    """
+    from .idl_compiler.loading import load_file
+
+    return load_file(path, include=include, defines=defines or {}, default_extensibility=default_extensibility)
+
+
+def loads(
+    text: str,
+    *,
+    include: Sequence[str | Path] = (),
+    defines: Mapping[str, str] | None = None,
+    default_extensibility: Extensibility = Extensibility.APPENDABLE,
+) -> Namespace:
+    """The types in IDL text; everything else as in :func:`load`."""
+    from .idl_compiler.loading import load_text
+
+    return load_text(text, include=include, defines=defines or {}, default_extensibility=default_extensibility)
+
+
+def to_idl(python_class: type[Any]) -> str:
+    """The IDL of a class that is an IDL type, and of all types that it needs; ``loads`` gives the same types again.
+
+    Raises BadParameter for a class that is none, or whose names IDL does not allow.
+    """
+    from .idl_compiler.idl_text import idl_text
+
+    return idl_text(named_type(python_class))

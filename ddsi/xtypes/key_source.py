@@ -87,6 +87,8 @@ class _KeyFinder:
             length = emitter.item("I", 4, "h")
             start = emitter.position
         keys = [member for member in struct.members if member.is_key] or list(struct.members)
+        if not keys:
+            raise _NoExtractorError
         for member in struct.members[: struct.members.index(keys[-1]) + 1]:
             if member.is_optional:
                 raise _NoExtractorError

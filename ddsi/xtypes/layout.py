@@ -147,7 +147,7 @@ def first_alignment(type_: IdlType) -> int:
         case ArrayType():
             return first_alignment(type_.element)
         case StructType(extensibility=Extensibility.FINAL):
-            return first_alignment(type_.members[0].type)
+            return first_alignment(type_.members[0].type) if type_.members else 1
         case UnionType(extensibility=Extensibility.FINAL):
             return first_alignment(type_.discriminator.type)
         case _:

@@ -20,9 +20,21 @@ from ..structure.errors import BadParameter
 from . import model
 from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName
 from .enumerations import bitmask_type, enum_type
-from .model import ArrayType, BitsetType, IdlType, MapType, Primitive, SequenceType, String, StructType, UnionType
+from .model import (
+    ArrayType,
+    BitmaskType,
+    BitsetType,
+    EnumType,
+    IdlType,
+    MapType,
+    Primitive,
+    SequenceType,
+    String,
+    StructType,
+    UnionType,
+)
 
-__all__ = ["Resolved", "Resolver"]
+__all__ = ["Resolved", "Resolver", "named_type"]
 
 STRUCT_ATTRIBUTE = "__idl_struct__"
 """Where a class decorated with ``idl.struct``, ``idl.union`` or ``idl.bitset`` keeps the type that it is."""
@@ -170,6 +182,14 @@ def _checked_key(type_: IdlType) -> IdlType:
     if isinstance(type_, (SequenceType, ArrayType, MapType, StructType, UnionType, BitsetType)):
         raise BadParameter(f"a map's key is a number, a string, a character, a boolean or an enum, not {type_}")
     return type_
+
+
+def named_type(python_class: Any) -> EnumType | BitmaskType | BitsetType | StructType | UnionType:
+    """The IDL type that a class is.  BadParameter where it is none."""
+    found = _class_type(python_class) if isinstance(python_class, type) else None
+    if not isinstance(found, (EnumType, BitmaskType, BitsetType, StructType, UnionType)):
+        raise BadParameter(f"{python_class!r} is no IDL type; it is a class decorated with @idl.struct or its siblings")
+    return found
 
 
 def _bounded(type_: IdlType, limit: int) -> IdlType:

@@ -10,7 +10,9 @@ from .model import (
     Composite,
     Extensibility,
     IdlType,
+    MapType,
     Member,
+    SequenceType,
     StructType,
     UnionType,
     reachable_structs,
@@ -30,6 +32,9 @@ def complete(struct: StructType) -> StructType:
     try:
         for inner in reachable_structs(struct):
             _refuse_endless(inner)
+        for inner in reachable_structs(struct):
+            for member in inner.members:
+                _refuse_elements_without_octets(inner, member)
     except NameError as error:
         raise BadParameter(f"{struct.type_name}: an annotation cannot be resolved: {error}") from error
     return struct
@@ -55,6 +60,30 @@ def _refuse_endless(struct: Composite) -> None:
             if id(type_) not in seen:
                 seen.add(id(type_))
                 pending.append(type_)
+
+
+def _refuse_elements_without_octets(composite: Composite, member: Member) -> None:
+    """A sequence of empty structs would have any number of elements in no octets, and reading it no bound in time."""
+    type_: IdlType = member.type
+    while isinstance(type_, (SequenceType, ArrayType, MapType)):
+        element = type_.value if isinstance(type_, MapType) else type_.element
+        if not isinstance(type_, MapType) and not _has_octets(element):
+            raise BadParameter(
+                f"{composite.python_class.__name__}.{member.name}: its elements are of {element}, which has no members"
+            )
+        type_ = element
+
+
+def _has_octets(type_: IdlType) -> bool:
+    """Whether every value has an octet at least."""
+    match type_:
+        case StructType():
+            framed = type_.extensibility is Extensibility.MUTABLE
+            return framed or any(member.is_optional or _has_octets(member.type) for member in type_.members)
+        case ArrayType():
+            return _has_octets(type_.element)
+        case _:
+            return True
 
 
 def _by_value(composite: Composite) -> list[Member]:

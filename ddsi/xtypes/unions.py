@@ -17,8 +17,21 @@ from ..structure.errors import BadParameter
 from .annotations import CaseLabels, HashId, MemberId, autoid_hash
 from .defaults import default_value, union_zero
 from .definition import own_annotations
+from .enumerations import bitmask_from
 from .equality import same
-from .model import BOOLEAN, CHAR, WCHAR, Case, EnumType, Extensibility, IdlType, Member, Primitive, UnionType
+from .model import (
+    BOOLEAN,
+    CHAR,
+    WCHAR,
+    BitmaskType,
+    Case,
+    EnumType,
+    Extensibility,
+    IdlType,
+    Member,
+    Primitive,
+    UnionType,
+)
 from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver
 
 __all__ = ["define_union", "selected_member", "union_type"]
@@ -174,7 +187,8 @@ class _CaseSearch:
 
 
 def _is_discriminator(type_: IdlType) -> bool:
-    return isinstance(type_, EnumType) or (isinstance(type_, Primitive) and type_.code not in "fd")
+    """A bitmask is none in IDL, but Fast DDS has such unions among its types."""
+    return isinstance(type_, (EnumType, BitmaskType)) or (isinstance(type_, Primitive) and type_.code not in "fd")
 
 
 def _discriminator_value(type_: IdlType, value: Any) -> Any:
@@ -184,6 +198,10 @@ def _discriminator_value(type_: IdlType, value: Any) -> Any:
             return type_.python_class(value)
         except ValueError:
             raise BadParameter(f"{value!r} is no literal of {type_.type_name}") from None
+    if isinstance(type_, BitmaskType):
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << type_.bit_bound:
+            raise BadParameter(f"{value!r} is no {type_.type_name}")
+        return bitmask_from(type_.python_class, value)
     assert isinstance(type_, Primitive)
     if type_ == BOOLEAN:
         fits = isinstance(value, bool)
@@ -216,8 +234,7 @@ def unlabelled(union: UnionType) -> Any:
         candidates = range(len(taken) + 1)
     for candidate in candidates:
         if candidate not in taken:
-            found: Any = candidate
-            return found
+            return _discriminator_value(type_, candidate)
     raise BadParameter(f"{union.type_name}: every discriminator has a case of its own; the default one is never chosen")
 
 

@@ -235,10 +235,14 @@ def test_members_that_cannot_be_are_refused_by_name(name: str) -> None:
         idl.struct(class_)
 
 
-def _empty() -> None:
-    @idl.struct
-    class Wrong:
-        pass
+def test_a_struct_may_be_empty_but_no_element_of_a_sequence() -> None:
+    """Else a count of four billion elements would take no octets, and reading them all the time."""
+    empty: type[Any] = idl.struct(type("Empty", (), {}))
+    holder: type[Any] = idl.struct(type("Holder", (), {"__annotations__": {"e": empty, "n": idl.int32}}))
+    assert deserialize(holder, serialize(holder(empty(), 3))) == holder(empty(), 3)
+    many: type[Any] = idl.struct(type("Many", (), {"__annotations__": {"es": idl.sequence[empty]}}))  # type: ignore[valid-type]
+    with pytest.raises(BadParameter, match=r"Many\.es: its elements are of Empty, which has no members"):
+        serialize(many([]))
 
 
 def _same_id() -> None:
@@ -317,7 +321,6 @@ def _no_default_literal() -> None:
 @pytest.mark.parametrize(
     ("define", "reason"),
     [
-        (_empty, "Wrong: a struct has one member at least"),
         (_same_id, "Wrong.b: its member id 0x0 is that of a"),
         (_init_variable, "Wrong.b: an InitVar does not travel"),
         (_undecorated_base, "Wrong: its base Ordinary is not decorated"),

@@ -1,0 +1,378 @@
+"""From types to IDL text: what ``ddsi.idl.to_idl`` does (OMG IDL 4.2).
+
+The text holds the type and all that it needs, in an order in which each name is known before it is used; read again, it
+gives the same types.  IDL has no name for an array inside a sequence or map, so such a one becomes a typedef.  What IDL
+cannot say (a comment, numpy as the form of values) is lost.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ...structure.errors import BadParameter
+from ..annotations import autoid_hash
+from ..model import (
+    ArrayType,
+    BitmaskType,
+    BitsetType,
+    Case,
+    Composite,
+    EnumType,
+    IdlType,
+    MapType,
+    Member,
+    Primitive,
+    SequenceType,
+    String,
+    StructType,
+    UnionType,
+)
+from .expressions import KEYWORDS
+from .python_names import literal_identifier
+
+__all__ = ["idl_text"]
+
+_Named = EnumType | BitmaskType | BitsetType | StructType | UnionType
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_FOLDED_KEYWORDS = frozenset(word.lower() for word in KEYWORDS)
+_INDENT = "  "
+_PRIMITIVES = {"float32": "float", "float64": "double"}
+
+
+def idl_text(type_: _Named) -> str:
+    """The IDL of a type and of what it needs.  BadParameter where its names are none in IDL, or collide."""
+    order, recursive = _in_order(type_)
+    writer = _Writer(order)
+    blocks: list[tuple[tuple[str, ...], list[str]]] = []
+    announced: set[int] = set()
+    for index, named in enumerate(order):
+        for forward in recursive.get(id(named), []):
+            if id(forward) not in announced and forward in order[index:]:
+                announced.add(id(forward))
+                kind = "struct" if isinstance(forward, StructType) else "union"
+                blocks.append((_module(forward), [f"{kind} {_escaped(_path(forward)[-1])};"]))
+        blocks.append((_module(named), writer.definition(named)))
+    return "".join(_modules(blocks))
+
+
+def _modules(blocks: Sequence[tuple[tuple[str, ...], list[str]]]) -> Iterator[str]:
+    """The blocks, each inside the braces of its modules, which stay open as long as they can."""
+    opened: tuple[str, ...] = ()
+    for number, (module, lines) in enumerate(blocks):
+        shared = 0
+        while shared < min(len(opened), len(module)) and opened[shared] == module[shared]:
+            shared += 1
+        yield from _closing(opened, shared)
+        yield "\n" if number else ""
+        for depth in range(shared, len(module)):
+            yield f"{_INDENT * depth}module {_escaped(module[depth])} {{\n"
+        opened = module
+        inner = _INDENT * len(module)
+        yield "".join(f"{inner}{line}\n" for line in lines)
+    yield from _closing(opened, 0)
+
+
+def _closing(opened: tuple[str, ...], shared: int) -> Iterator[str]:
+    for depth in reversed(range(shared, len(opened))):
+        yield f"{_INDENT * depth}}};\n"
+
+
+# --- the order ---------------------------------------------------------------------------------------------
+
+
+def _in_order(root: _Named) -> tuple[list[_Named], dict[int, list[Composite]]]:
+    """(types, each behind what it needs; for a type, by id, those that it names and that come behind it)."""
+    order: list[_Named] = []
+    state: dict[int, bool] = {}
+    """False while a type waits for what it needs, True when it has its place."""
+    recursive: dict[int, list[Composite]] = {}
+    pending: list[tuple[_Named, Iterator[_Named]]] = [(root, iter(_needs(root)))]
+    state[id(root)] = False
+    while pending:
+        type_, needs = pending[-1]
+        needed = next(needs, None)
+        if needed is None:
+            order.append(type_)
+            state[id(type_)] = True
+            pending.pop()
+        elif id(needed) not in state:
+            state[id(needed)] = False
+            pending.append((needed, iter(_needs(needed))))
+        elif not state[id(needed)] and isinstance(needed, (StructType, UnionType)):
+            recursive.setdefault(id(type_), []).append(needed)
+    return order, recursive
+
+
+def _needs(type_: _Named) -> list[_Named]:
+    found: list[_Named] = []
+    if isinstance(type_, BitsetType):
+        found += [type_.base] if type_.base is not None else []
+    elif isinstance(type_, StructType):
+        found += [type_.base] if type_.base is not None else []
+        for member in type_.declared:
+            found += _named(member.type)
+    elif isinstance(type_, UnionType):
+        for member in type_.members:
+            found += _named(member.type)
+    return found
+
+
+def _named(type_: IdlType) -> list[_Named]:
+    while isinstance(type_, (SequenceType, ArrayType)):
+        type_ = type_.element
+    if isinstance(type_, MapType):
+        return [*_named(type_.key), *_named(type_.value)]
+    return [] if isinstance(type_, (Primitive, String)) else [type_]
+
+
+# --- names -------------------------------------------------------------------------------------------------
+
+
+def _path(named: _Named) -> tuple[str, ...]:
+    path = tuple(named.type_name.split("::"))
+    for part in path:
+        if not _NAME.fullmatch(part):
+            raise BadParameter(
+                f"{named.type_name}: {part!r} is no name in IDL; give the type a typename such as m::Name"
+            )
+    return path
+
+
+def _module(named: _Named) -> tuple[str, ...]:
+    return _path(named)[:-1]
+
+
+def _escaped(name: str) -> str:
+    """An underscore before what would be a keyword, or begins with one already."""
+    return f"_{name}" if name.lower() in _FOLDED_KEYWORDS or name.startswith("_") else name
+
+
+def _literal_name(literal: enum.IntEnum | enum.IntFlag) -> str:
+    """The name in IDL: without the underscore that only Python needs."""
+    name = literal.name or ""
+    bare = name.rstrip("_")
+    return _escaped(bare if bare != name and literal_identifier(bare) == name else name)
+
+
+# --- definitions -------------------------------------------------------------------------------------------
+
+
+class _Writer:
+    def __init__(self, order: Sequence[_Named]) -> None:
+        self._module: tuple[str, ...] = ()
+        self._typedefs: list[str] = []
+        self._taken: dict[str, str] = {}
+        for named in order:
+            self._take("::".join(_path(named)), named.type_name)
+            if isinstance(named, EnumType):  # IDL puts the literals beside their enum
+                for literal in named.python_class:
+                    self._take("::".join((*_module(named), literal.name)), f"{named.type_name}.{literal.name}")
+
+    def _take(self, path: str, what: str) -> None:
+        """One path, one thing: types of one name, and literals of one name in one module, cannot be told apart."""
+        earlier = self._taken.get(path.lower())
+        if earlier is not None:
+            raise BadParameter(
+                f"{what} and {earlier} have one name in IDL, where case does not distinguish, and literals stand beside"
+                " their enum; give one a typename in another module"
+            )
+        self._taken[path.lower()] = what
+
+    def definition(self, named: _Named) -> list[str]:
+        self._module = _module(named)
+        self._typedefs = []
+        match named:
+            case EnumType():
+                lines = self._enum(named)
+            case BitmaskType():
+                lines = self._bitmask(named)
+            case BitsetType():
+                lines = self._bitset(named)
+            case StructType():
+                lines = self._struct(named)
+            case UnionType():
+                lines = self._union(named)
+        return [*self._typedefs, *lines]
+
+    def _enum(self, type_: EnumType) -> list[str]:
+        lines = [f"@bit_bound({type_.bit_bound})"] if type_.bit_bound != 32 else []
+        lines.append(f"enum {_escaped(_path(type_)[-1])} {{")
+        literals = list(type_.python_class)
+        due = 0
+        for literal in literals:
+            marks = "" if literal.value == due else f"@value({literal.value}) "
+            if literal is type_.default and literal is not literals[0]:
+                marks += "@default_literal "
+            lines.append(f"{_INDENT}{marks}{_literal_name(literal)}{',' if literal is not literals[-1] else ''}")
+            due = literal.value + 1
+        return [*lines, "};"]
+
+    def _bitmask(self, type_: BitmaskType) -> list[str]:
+        lines = [f"@bit_bound({type_.bit_bound})"] if type_.bit_bound != 32 else []
+        lines.append(f"bitmask {_escaped(_path(type_)[-1])} {{")
+        flags = list(type_.python_class)
+        if not flags:
+            raise BadParameter(f"{type_.type_name}: a bitmask without flags cannot be said in IDL")
+        due = 0
+        for flag in flags:
+            position = flag.value.bit_length() - 1
+            mark = "" if position == due else f"@position({position}) "
+            lines.append(f"{_INDENT}{mark}{_literal_name(flag)}{',' if flag is not flags[-1] else ''}")
+            due = position + 1
+        return [*lines, "};"]
+
+    def _bitset(self, type_: BitsetType) -> list[str]:
+        base, inherited, position = "", 0, 0
+        if type_.base is not None:
+            base, inherited, position = f" : {self._reference(type_.base)}", len(type_.base.fields), type_.base.bits
+        lines = [f"bitset {_escaped(_path(type_)[-1])}{base} {{"]
+        for field in sorted(type_.fields[inherited:], key=lambda field: field.position):
+            if field.position < position:
+                raise BadParameter(f"{type_.type_name}.{field.name}: its bits lie below those of the base")
+            if field.position > position:
+                lines.append(f"{_INDENT}bitfield<{field.position - position}>;")
+            lines.append(f"{_INDENT}bitfield<{field.width}, {field.type}> {_escaped(field.name)};")
+            position = field.position + field.width
+        return [*lines, "};"]
+
+    def _struct(self, type_: StructType) -> list[str]:
+        name = _path(type_)[-1]
+        inherited = type_.base.declared if type_.base is not None else ()
+        base = f" : {self._reference(type_.base)}" if type_.base is not None else ""
+        lines = [*_type_marks(type_), f"struct {_escaped(name)}{base} {{"]
+        due = inherited[-1].id + 1 if inherited else 0
+        for member in type_.declared[len(inherited) :]:
+            marks = self._member_marks(member, due)
+            lines.append(f"{_INDENT}{marks}{self._declarator(member, name)};")
+            due = member.id + 1
+        return [*lines, "};"]
+
+    def _union(self, type_: UnionType) -> list[str]:
+        name = _path(type_)[-1]
+        discriminator = type_.discriminator.type
+        key = "@key " if type_.discriminator.is_key else ""
+        lines = [*_type_marks(type_), f"union {_escaped(name)} switch ({key}{self._type(discriminator, name)}) {{"]
+        due = 1
+        for case in type_.cases:
+            lines += [f"{_INDENT}case {self._label(discriminator, label)}:" for label in case.labels]
+            lines += [f"{_INDENT}default:"] if case.is_default else []
+            lines.append(f"{_INDENT * 2}{self._member_marks(case, due)}{self._declarator(case, name)};")
+            due = case.id + 1
+        return [*lines, "};"]
+
+    def _label(self, discriminator: IdlType, label: Any) -> str:
+        if isinstance(discriminator, BitmaskType):
+            return _literal_name(label)
+        return self._constant(discriminator, label)
+
+    def _member_marks(self, member: Member, due: int) -> str:
+        marks = []
+        if member.is_key:
+            marks.append("@key")
+        if member.id != due and member.id == autoid_hash(member.name_in_idl):
+            marks.append("@hashid")
+        elif member.id != due:
+            marks.append(f"@id({member.id})" if member.id < 1 << 16 else f"@id({member.id:#x})")
+        if member.is_optional:
+            marks.append("@optional")
+        if member.must_understand:
+            marks.append("@must_understand")
+        if member.is_external:
+            marks.append("@external")
+        if not member.is_serialized:
+            marks.append("@non_serialized")
+        if member.default is not None and not isinstance(member, Case):
+            value = member.default()
+            if value is not None and isinstance(member.type, (Primitive, String, EnumType)) and _is_sayable(value):
+                marks.append(f"@default({self._constant(member.type, value)})")
+        return "".join(f"{mark} " for mark in marks)
+
+    # --- types -------------------------------------------------------------------------------------------
+
+    def _declarator(self, member: Member, owner: str) -> str:
+        """Type and name; the dimensions of an array stand behind the name."""
+        name, type_, dimensions = _escaped(member.name_in_idl), member.type, ""
+        if isinstance(type_, ArrayType):
+            dimensions = "".join(f"[{dimension}]" for dimension in type_.dimensions)
+            type_ = type_.element
+        return f"{self._type(type_, f'{owner}_{member.name_in_idl}')} {name}{dimensions}"
+
+    def _type(self, type_: IdlType, where: str) -> str:
+        """``where`` names what needs a name."""
+        match type_:
+            case Primitive(name=name):
+                return _PRIMITIVES.get(name, name)
+            case String():
+                return str(type_)
+            case SequenceType(element=element, bound=bound):
+                limit = "" if bound is None else f", {bound}"
+                return f"sequence<{self._type(element, where)}{limit}>"
+            case MapType(key=key, value=value, bound=bound):
+                limit = "" if bound is None else f", {bound}"
+                return f"map<{self._type(key, where)}, {self._type(value, where)}{limit}>"
+            case ArrayType(element=element, dimensions=dimensions):
+                inner = self._type(element, where)
+                alias = self._free_name(f"{where}_array")
+                self._typedefs.append(f"typedef {inner} {alias}{''.join(f'[{number}]' for number in dimensions)};")
+                return alias
+            case _:
+                return self._reference(type_)
+
+    def _free_name(self, name: str) -> str:
+        number, candidate = 2, name
+        while "::".join((*self._module, candidate)).lower() in self._taken:
+            candidate, number = f"{name}{number}", number + 1
+        self._taken["::".join((*self._module, candidate)).lower()] = candidate
+        return candidate
+
+    def _reference(self, named: _Named) -> str:
+        path = _path(named)
+        if path[:-1] == self._module:
+            return _escaped(path[-1])
+        return "::" + "::".join(map(_escaped, path))
+
+    def _constant(self, type_: IdlType, value: Any) -> str:
+        match type_:
+            case EnumType():
+                return self._literal(type_, type_.python_class(value))
+            case String():
+                return '"' + _escaped_text(str(value), '"') + '"'
+            case Primitive(name="boolean"):
+                return "TRUE" if value else "FALSE"
+            case Primitive(name="char" | "wchar"):
+                return "'" + _escaped_text(value, "'") + "'"
+            case Primitive(code="f" | "d"):
+                return repr(float(value))
+            case _:
+                return str(int(value))
+
+    def _literal(self, type_: EnumType, literal: enum.IntEnum) -> str:
+        if _module(type_) == self._module:
+            return _literal_name(literal)
+        return "::" + "::".join((*map(_escaped, _module(type_)), _literal_name(literal)))
+
+
+def _type_marks(type_: Composite) -> list[str]:
+    return [f"@{type_.extensibility.value}{' @nested' if type_.is_nested else ''}"]
+
+
+def _is_sayable(value: Any) -> bool:
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+def _escaped_text(text: str, quote: str) -> str:
+    def escaped(character: str) -> str:
+        if character in (quote, "\\"):
+            return f"\\{character}"
+        if " " <= character <= "~":
+            return character
+        code = ord(character)
+        # Octal has three digits at most, so that no digit behind it joins in.
+        return f"\\{code:03o}" if code < 0o400 else f"\\u{code:04x}" if code <= 0xFFFF else character
+
+    return "".join(map(escaped, text))

@@ -1,0 +1,128 @@
+"""The lexer: text to tokens (OMG IDL 4.2 §7.2), for the preprocessor and the parser alike.
+
+Comments are dropped, but the comment right before a token stays with it, since it may describe what the token
+begins.  A backslash at the end of a line joins it to the next.  ``>`` is always a token of its own: two of them close
+nested templates, or are a shift, as the parser finds.  Time is linear in the text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+from .source_text import IdlError, Place, SourceText
+
+__all__ = ["Token", "TokenKind", "tokenize"]
+
+
+class TokenKind(Enum):
+    NAME = "name"
+    INTEGER = "integer"
+    FLOATING = "floating-point number"
+    STRING = "string"
+    CHARACTER = "character"
+    PUNCTUATION = "punctuation"
+    PRAGMA = "pragma"
+    END = "end of the text"
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    kind: TokenKind
+    text: str
+    place: Place
+    starts_line: bool = False
+    spaced: bool = False
+    """White space or a comment is before it."""
+    comment: str = ""
+    """What the comment before it says."""
+
+    def __str__(self) -> str:
+        return self.kind.value if self.kind is TokenKind.END else f"'{self.text}'"
+
+
+_SPACE = re.compile(r"(?:[ \t\r\f\v]|\\[ \t]*\r?\n)+")
+_TOKEN = re.compile(
+    r"""
+    (?P<string>   L?"(?:[^"\\\n]|\\.)*" )
+  | (?P<character>L?'(?:[^'\\\n]|\\.)+' )
+  | (?P<name>     [A-Za-z_][A-Za-z0-9_]* )
+  | (?P<floating> (?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[A-Za-z0-9_]* | [0-9]+[eE][+-]?[0-9]+[A-Za-z0-9_]* )
+  | (?P<integer>  0[xX][0-9A-Fa-f]*[A-Za-z0-9_]* | [0-9]+[A-Za-z0-9_]* )
+  | (?P<punctuation> :: | << | && | \|\| | == | != | \#\# | [-{}()\[\];:,<>=+*/%&|^~!@#?.] )
+    """,
+    re.VERBOSE,
+)
+_NUMBER = re.compile(
+    r"0[xX][0-9A-Fa-f]+|[0-9]+|(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[fFdD]?|[0-9]+[eE][+-]?[0-9]+[fFdD]?"
+)
+_LONGEST_NUMBER = 400
+"""Digits; Python takes quadratic time to read more of them."""
+
+_KINDS = {
+    "string": TokenKind.STRING,
+    "character": TokenKind.CHARACTER,
+    "name": TokenKind.NAME,
+    "floating": TokenKind.FLOATING,
+    "integer": TokenKind.INTEGER,
+    "punctuation": TokenKind.PUNCTUATION,
+}
+
+
+def tokenize(source: SourceText) -> Iterator[Token]:
+    """The tokens of a text, the end as the last.  IdlError for a character, number or comment that is none."""
+    text, position, end = source.text, 0, len(source.text)
+    starts_line, spaced, comments = True, False, list[str]()
+    while position < end:
+        character = text[position]
+        if character == "\n":
+            if comments and text[position + 1 : position + 2] in ("\n", "\r"):
+                comments = []  # a blank line: the comment belongs to nothing in particular
+            starts_line, spaced, position = True, True, position + 1
+        elif found := _SPACE.match(text, position):
+            spaced, position = True, found.end()
+        elif text.startswith("//", position) or text.startswith("/*", position):
+            position, comment = _comment(source, position)
+            if starts_line:  # one behind something else on the line belongs to that
+                comments.append(comment)
+            spaced = True
+        else:
+            found = _TOKEN.match(text, position)
+            if found is None:
+                raise IdlError(Place(source, position), _unexpected(text, position))
+            kind = _KINDS[found.lastgroup or ""]
+            if kind in (TokenKind.INTEGER, TokenKind.FLOATING) and not _is_number(found.group()):
+                raise IdlError(Place(source, position), f"'{found.group()[:80]}' is no number")
+            yield Token(kind, found.group(), Place(source, position), starts_line, spaced, "\n".join(comments))
+            starts_line, spaced, comments, position = False, False, [], found.end()
+    yield Token(TokenKind.END, "", Place(source, end), True, True)
+
+
+def _is_number(text: str) -> bool:
+    return len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text) is not None
+
+
+def _comment(source: SourceText, start: int) -> tuple[int, str]:
+    """(where it ends, what it says)."""
+    text = source.text
+    if text.startswith("//", start):
+        end = text.find("\n", start)
+        while end > 0 and text[start:end].rstrip("\r").endswith("\\"):
+            end = text.find("\n", end + 1)
+        end = len(text) if end < 0 else end
+        return end, text[start:end].lstrip("/!<").strip()
+    end = text.find("*/", start + 2)
+    if end < 0:
+        raise IdlError(Place(source, start), "the comment has no end; expected '*/'")
+    lines = [line.strip().lstrip("*").strip() for line in text[start + 2 : end].lstrip("*!<").splitlines()]
+    return end + 2, "\n".join(lines).strip()
+
+
+def _unexpected(text: str, position: int) -> str:
+    character = text[position]
+    if character in "\"'":
+        what = "string" if character == '"' else "character"
+        return f"the {what} has no end on this line; expected {character}"
+    return f"the character {character!r} has no meaning here"
