@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..behavior.stateless_writer import StatelessWriter
 from ..discovery.builtin_endpoints import ANNOUNCED_ENDPOINTS
+from ..discovery.departures import Departures
 from ..discovery.parameters import (
     decode_key,
     decode_participant,
@@ -66,6 +67,7 @@ class DiscoveryAgent:
         self._announcer = SpdpAnnouncer(announce_to, engine.config.announcement_period, engine.random.random)
         self._eviction = Eviction(engine)
         self._ignored: set[Guid] = set()
+        self._departures = Departures()
         # "Endpoint gone", oldest first: said when, by which builtin writer, under which number.
         self._farewells: deque[tuple[float, EntityId, int]] = deque()
 
@@ -168,7 +170,8 @@ class DiscoveryAgent:
         try:
             if change.kind is not ChangeKind.ALIVE:
                 guid = decode_key(change.payload, ParameterId.PARTICIPANT_GUID, key_hash=change.key_hash)
-                if guid[:12] == incoming.prefix:
+                if guid[:12] == incoming.prefix and guid[:12] in self._engine.participants:
+                    self._departures.note(guid, change.sequence_number, incoming.now)
                     self.participant_lost(guid, LossReason.GOODBYE, incoming.now)
                 return
             data = decode_participant(
@@ -181,6 +184,9 @@ class DiscoveryAgent:
             is_must = isinstance(error, MustUnderstandUnknown)
             reason = DropReason.MUST_UNDERSTAND if is_must else DropReason.MALFORMED_DISCOVERY_DATA
             self._engine.dropped(reason, incoming.source, str(error))
+            return
+        if proxy is None and self._departures.overtook(data.guid, change.sequence_number, incoming.now):
+            self._engine.dropped(DropReason.OUT_OF_ORDER, incoming.source, f"{data.guid} has said goodbye since")
             return
         if not data.metatraffic_unicast and not data.default_unicast:
             data = replace(data, metatraffic_unicast=(incoming.source,))

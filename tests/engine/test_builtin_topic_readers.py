@@ -202,7 +202,7 @@ def test_who_comes_back_lives_in_another_generation() -> None:
     participants, _, _ = readers(participant)
     stranger.introduce(participant)
     participant.receive_datagram(stranger.goodbye(), stranger.address, 1.0)
-    stranger.introduce(participant, 2.0)
+    stranger.introduce(participant, 3.0)
     infos = [info for info, _ in participants.history.read()]
     assert [(info.valid_data, info.disposed_generation_count) for info in infos] == [(False, 0), (True, 1)]
     assert {info.instance_state for info in infos} == {ALIVE}

@@ -18,6 +18,7 @@ from ddsi.structure.status import PublicationMatched, SubscriptionMatched
 from ddsi.trace.events import ParticipantLost
 from ddsi.trace.reasons import DropReason, LossReason
 from ddsi.trace.sink import MemorySink
+from tests.engine.wire import Stranger, engine
 
 RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
 LATE = RELIABLE | Qos(durability=TransientLocal())
@@ -350,6 +351,26 @@ def test_a_goodbye_is_heard_at_once_by_all() -> None:
     assert not knows(c, a)
     assert b.readers[0].matched_count == 0
     assert isinstance(b.statuses_of(SubscriptionMatched)[-1], SubscriptionMatched)
+
+
+def test_an_announcement_that_a_goodbye_overtook_brings_nobody_back() -> None:
+    """They came by different sockets, and the later one was read first."""
+    participant, stranger = engine(), Stranger()
+    stranger.introduce(participant, 1.0)
+    participant.receive_datagram(stranger.goodbye(), stranger.address, 2.0)
+    for _ in range(2):
+        participant.receive_datagram(stranger.spdp(), stranger.address, 2.001)
+    assert not participant.participants
+    assert participant.drops[DropReason.OUT_OF_ORDER] == 2
+    participant.receive_datagram(stranger.spdp(), stranger.address, 3.1)
+    assert list(participant.participants) == [stranger.prefix], "it has begun anew, and counts from 1"
+
+
+def test_a_goodbye_of_somebody_unknown_keeps_nobody_out() -> None:
+    participant, stranger = engine(), Stranger()
+    participant.receive_datagram(stranger.goodbye(), stranger.address, 1.0)
+    participant.receive_datagram(stranger.spdp(), stranger.address, 1.1)
+    assert list(participant.participants) == [stranger.prefix]
 
 
 def test_endpoints_that_are_deleted_are_unmatched_at_once() -> None:
