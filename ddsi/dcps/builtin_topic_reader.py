@@ -49,14 +49,14 @@ class BuiltinTopicReader(SampleReader[T]):
                 f"a BuiltinTopicReader reads {', '.join(known.__name__ for known in _KINDS)}, not {kind!r}"
             )
         super().__init__(participant, None)
-        self._kind: type[T] = kind
+        self._topic_name: str = kind.TOPIC_NAME
         self._reader: LocalBuiltinTopicReader = self._pump.engine.builtin_readers.create(kind, self._pump.now())
         self._history = self._reader.history
         participant._adopt(self)
         participant._register(self.guid, self)
 
     def __repr__(self) -> str:
-        return f"<BuiltinTopicReader of {self._kind.TOPIC_NAME}, {len(self._history)} samples>"
+        return f"<BuiltinTopicReader of {self._topic_name}, {len(self._history)} samples>"
 
     @property
     def guid(self) -> Guid:

@@ -41,7 +41,6 @@ __all__ = ["BuiltinTopicChange", "BuiltinTopicReaders", "LocalBuiltinTopicReader
 
 _QOS = EndpointQos(reliability=Reliable(), durability=TransientLocal(), history=KeepLast(1))
 _MAX_ENDED = 1024
-_NOTHING = b""
 
 Announced = DiscoveredParticipantData | DiscoveredWriterData | DiscoveredReaderData
 _KIND_OF: dict[type, type[BuiltinTopicData]] = {
@@ -57,7 +56,7 @@ class BuiltinTopicChange(CacheChange):
     __slots__ = ("data",)
 
     def __init__(self, kind: ChangeKind, data: BuiltinTopicData, sequence_number: int, source_timestamp: int) -> None:
-        super().__init__(kind, data.key.participant, sequence_number, _NOTHING, data.key, source_timestamp)
+        super().__init__(kind, data.key.participant, sequence_number, b"", data.key, source_timestamp)
         self.data = data
 
 

@@ -105,7 +105,8 @@ def test_one_that_comes_early_has_the_same_as_one_that_comes_late() -> None:
 def test_what_changes_is_told_and_what_is_only_said_again_is_not() -> None:
     participant, stranger = with_stranger()
     participants, publications, _ = readers(participant)
-    taken(participants), taken(publications)
+    taken(participants)
+    taken(publications)
     for user_data in (b"hello", b"hello again", b"hello again"):
         participant.receive_datagram(stranger.spdp(user_data=user_data, entity_name="stranger"), stranger.address, 1.0)
     ((who, state),) = taken(participants)
@@ -189,7 +190,8 @@ def test_an_endpoint_that_its_participant_deletes_is_disposed() -> None:
 def test_who_falls_silent_has_no_writers_when_its_lease_has_run_out() -> None:
     participant, stranger = with_stranger()
     participants, publications, _ = readers(participant)
-    taken(participants), taken(publications)
+    taken(participants)
+    taken(publications)
     participant.handle_timeout(19.0)
     assert (taken(participants), taken(publications)) == ([], [])
     participant.handle_timeout(20.1)
@@ -211,7 +213,8 @@ def test_who_comes_back_lives_in_another_generation() -> None:
 def test_whom_the_application_ignores_is_gone() -> None:
     participant, stranger = with_stranger()
     participants, publications, _ = readers(participant)
-    taken(participants), taken(publications)
+    taken(participants)
+    taken(publications)
     participant.discovery.ignore(stranger.guid, 1.0)
     participant.receive_datagram(stranger.spdp(), stranger.address, 2.0)
     assert [state for _, state in states(participants)] == [NO_WRITERS]
