@@ -13,6 +13,11 @@ from ddsi.engine import Participant
 from ddsi.messages.receiver import MessageReceiver
 from ddsi.messages.submessages import Data
 from ddsi.structure import builtin_entity_ids as ids
+from ddsi.structure.builtin_topic_data import (
+    ParticipantBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
+)
 from ddsi.structure.cache_change import ChangeKind
 from ddsi.structure.errors import MalformedMessage, MalformedSample
 from ddsi.structure.guid import EntityId
@@ -57,6 +62,8 @@ def matched_engine() -> tuple[Participant, Stranger]:
     participant, stranger = engine(config=BOUNDS), Stranger()
     writer = participant.create_writer("Out", "T", writer_qos(HISTORY), 0.0, is_keyed=False)
     participant.create_reader("In", "T", reader_qos(RELIABLE), 0.0, is_keyed=False)
+    for kind in (ParticipantBuiltinTopicData, PublicationBuiltinTopicData, SubscriptionBuiltinTopicData):
+        participant.builtin_readers.create(kind, 0.0)
     stranger.introduce(participant)
     for octets in (stranger.sedp_writer(1, "In", RELIABLE), stranger.sedp_reader(1, "Out", HISTORY)):
         participant.receive_datagram(octets, stranger.address, 0.0)
