@@ -22,10 +22,12 @@ __all__ = [
     "deliver_to_all",
     "deliver_to_newcomer",
     "deliver_to_two",
+    "dismiss",
     "refuse",
     "restart_publisher",
     "restart_subscriber",
     "say_goodbye",
+    "written",
 ]
 
 STEP_TIMEOUT = 20.0
@@ -79,9 +81,9 @@ async def _deliver(cast: Cast, publisher: Process, subscriber: Process) -> None:
     await subscriber.expect("HOLDING", timeout=cast.patience)
     _check_acknowledged(cast, publisher)
     _check_gone(cast, publisher, subscriber)
-    await _dismiss(publisher)
-    await _dismiss(subscriber)
-    _check_received(subscriber, _written(publisher))
+    await dismiss(publisher)
+    await dismiss(subscriber)
+    _check_received(subscriber, written(publisher))
 
 
 async def deliver_to_two(cast: Cast) -> None:
@@ -99,9 +101,9 @@ async def deliver_to_all(*casts: Cast) -> None:
         await process.expect("HOLDING", timeout=cast.patience)
     _check_acknowledged(cast, publisher)
     for process in (publisher, *subscribers):
-        await _dismiss(process)
+        await dismiss(process)
     for subscriber in subscribers:
-        _check_received(subscriber, _written(publisher))
+        _check_received(subscriber, written(publisher))
 
 
 async def restart_subscriber(cast: Cast) -> None:
@@ -114,9 +116,9 @@ async def restart_subscriber(cast: Cast) -> None:
     await first.wait()
     second = await cast.start_subscriber()
     await second.expect("HOLDING", timeout=cast.patience)
-    await _dismiss(second)
-    await _dismiss(publisher)
-    _check_received(second, _written(publisher))
+    await dismiss(second)
+    await dismiss(publisher)
+    _check_received(second, written(publisher))
 
 
 async def restart_publisher(cast: Cast) -> None:
@@ -130,9 +132,9 @@ async def restart_publisher(cast: Cast) -> None:
     second = await cast.start_publisher()
     await second.expect("HOLDING", timeout=cast.patience)
     await subscriber.expect("HOLDING", timeout=cast.patience)
-    await _dismiss(second)
-    await _dismiss(subscriber)
-    _check_received(subscriber, _written(first) + _written(second))
+    await dismiss(second)
+    await dismiss(subscriber)
+    _check_received(subscriber, written(first) + written(second))
 
 
 async def deliver_some(cast: Cast) -> None:
@@ -142,11 +144,11 @@ async def deliver_some(cast: Cast) -> None:
     await _open_gate(cast, publisher, subscriber)
     await subscriber.expect("HOLDING", timeout=cast.patience)
     await publisher.expect("HOLDING", timeout=cast.patience)
-    await _dismiss(publisher)
-    await _dismiss(subscriber)
-    written = iter(_written(publisher))
+    await dismiss(publisher)
+    await dismiss(subscriber)
+    samples = iter(written(publisher))
     for sample in [match[1] for match in subscriber.matches("SAMPLE (.*)")]:
-        if sample not in written:  # `in` moves the iterator on: order and number matter
+        if sample not in samples:  # `in` moves the iterator on: order and number matter
             raise ExpectationFailed(f"{sample!r} was not written, or received twice, or out of order")
 
 
@@ -156,9 +158,9 @@ async def deliver_late(cast: Cast) -> None:
     await publisher.expect("HOLDING", timeout=cast.patience)
     subscriber = await cast.start_subscriber()
     await subscriber.expect("HOLDING", timeout=cast.patience)
-    await _dismiss(subscriber)
-    await _dismiss(publisher)
-    _check_received(subscriber, _latest(_written(publisher), cast.publisher_options.depth), in_any_order=True)
+    await dismiss(subscriber)
+    await dismiss(publisher)
+    _check_received(subscriber, _latest(written(publisher), cast.publisher_options.depth), in_any_order=True)
 
 
 async def say_goodbye(cast: Cast) -> None:
@@ -167,9 +169,9 @@ async def say_goodbye(cast: Cast) -> None:
     publisher = await cast.start_publisher()
     await publisher.expect("HOLDING", timeout=cast.patience)
     await subscriber.expect("HOLDING", timeout=cast.patience)
-    await _dismiss(publisher)
+    await dismiss(publisher)
     await subscriber.expect("MATCHED 0", timeout=3)
-    await _dismiss(subscriber)
+    await dismiss(subscriber)
 
 
 async def refuse(cast: Cast) -> None:
@@ -193,13 +195,13 @@ async def _open_gate(cast: Cast, publisher: Process, subscriber: Process) -> Non
         await publisher.send("write")
 
 
-async def _dismiss(process: Process) -> None:
+async def dismiss(process: Process) -> None:
     await process.send("leave")
     await process.expect("DONE .*")
     await process.expect_exit(0)
 
 
-def _written(publisher: Process) -> list[str]:
+def written(publisher: Process) -> list[str]:
     return [match[1] for match in publisher.matches("WROTE (.*)")]
 
 

@@ -36,6 +36,10 @@ class Options:
     """A folder (``keystore.py``); without one, nothing is secured."""
     identity: str = "alice"
     governance: str = "governance.p7s"
+    lease_s: int | None = None
+    """For how long a participant is believed to be there without being heard."""
+    read_pause_ms: int = 0
+    max_samples: int | None = None
 
     def arguments(self) -> list[str]:
         """The options as words, without the role."""
@@ -50,6 +54,12 @@ class Options:
             words += ["-B", str(self.blob_octets)]
         if self.keystore is not None:
             words += ["-k", self.keystore, "-p", self.identity, "-g", self.governance]
+        if self.lease_s is not None:
+            words += ["-L", str(self.lease_s)]
+        if self.read_pause_ms:
+            words += ["-z", str(self.read_pause_ms)]
+        if self.max_samples is not None:
+            words += ["-r", str(self.max_samples)]
         flags = {
             "-b": self.best_effort,
             "-v": self.volatile,

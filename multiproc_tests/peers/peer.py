@@ -55,22 +55,25 @@ class Peer:
     ) -> Process:
         """Starts the program in that role; ``others`` are the hosts that unicast discovery looks at besides its own."""
         addresses = dict.fromkeys([host.address, *(other.address for other in others)])
-        environment = network_environment(host.interface, list(addresses) if options.unicast else None)
+        unicast = list(addresses) if options.unicast else None
+        environment = network_environment(host.interface, unicast, lease_s=options.lease_s)
         command = [*self.locate(), *options.arguments(), "-a", host.address, role]
         return await stage.start(f"{role} {self.name}", command, namespace=host, environment=environment, folder=ROOT)
 
 
-def network_environment(interface: str, unicast_addresses: Sequence[str] | None = None) -> dict[str, str]:
+def network_environment(
+    interface: str, unicast_addresses: Sequence[str] | None = None, *, lease_s: int | None = None
+) -> dict[str, str]:
     """CYCLONEDDS_URI and DDSI_URI: this one interface; with addresses, unicast discovery of these alone."""
     general = f'<Interfaces><NetworkInterface name="{interface}"/></Interfaces>'
-    discovery = ""
+    discovery = f"<LeaseDuration>{lease_s}s</LeaseDuration>" if lease_s is not None else ""
     if unicast_addresses is not None:
         general += "<AllowMulticast>false</AllowMulticast>"
         peers = "".join(f'<Peer Address="{address}"/>' for address in unicast_addresses)
-        discovery = (
-            "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        discovery += (
+            "<ParticipantIndex>auto</ParticipantIndex>"
             f"<MaxAutoParticipantIndex>{MAX_PARTICIPANT_INDEX}</MaxAutoParticipantIndex>"
-            f"<Peers>{peers}</Peers></Discovery>"
+            f"<Peers>{peers}</Peers>"
         )
-    domain = f"<Domain><General>{general}</General>{discovery}</Domain>"
+    domain = f"<Domain><General>{general}</General><Discovery>{discovery}</Discovery></Domain>"
     return {"CYCLONEDDS_URI": f"<CycloneDDS>{domain}</CycloneDDS>", "DDSI_URI": f"<DDSI>{domain}</DDSI>"}

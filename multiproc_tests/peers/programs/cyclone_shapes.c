@@ -105,6 +105,8 @@ static dds_qos_t *endpoint_qos(void)
   /* What late joiners get is Cyclone's durability service; it would keep one sample of each instance.  */
   dds_qset_durability_service(qos, 0, history, o.depth, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
                               DDS_LENGTH_UNLIMITED);
+  if (o.max_samples)
+    dds_qset_resource_limits(qos, o.max_samples, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   /* An unregister must not arrive as a dispose.  */
   dds_qset_writer_data_lifecycle(qos, false);
   if (o.representation) {
@@ -230,7 +232,7 @@ static int take_some(dds_entity_t reader)
     say("MATCHED %u", matched = status.current_count);
   void *samples[BATCH] = { NULL };
   dds_sample_info_t infos[BATCH];
-  int count = checked("take", dds_take(reader, samples, infos, BATCH, BATCH));
+  int count = checked("take", dds_take(reader, samples, infos, BATCH, o.read_pause_ms ? 1 : BATCH));
   for (int i = 0; i < count; i++) {
     if (infos[i].valid_data) {
       say_sample("SAMPLE", samples[i]);
@@ -250,6 +252,7 @@ static int take_some(dds_entity_t reader)
   }
   if (count > 0)
     dds_return_loan(reader, samples, count);
+  dds_sleepfor(DDS_MSECS(o.read_pause_ms * count));
   return count > 0;
 }
 

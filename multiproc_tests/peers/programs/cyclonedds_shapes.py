@@ -114,6 +114,8 @@ def endpoint_qos(o: Arguments) -> Qos:
         Policy.DurabilityService(0, history, -1, -1, -1),
         Policy.WriterDataLifecycle(autodispose=False),
     ]
+    if o.max_samples:
+        policies.append(Policy.ResourceLimits(max_samples=o.max_samples))
     if o.representation:
         policies.append(
             Policy.DataRepresentation(
@@ -185,11 +187,10 @@ class Taker:
         if len(self.reader.get_matched_publications()) != self.matched:
             self.matched = len(self.reader.get_matched_publications())
             say("MATCHED", self.matched)
-        taken = self.reader.take(16)
+        taken = self.reader.take(1 if self.options.read_pause_ms else 16)
         for sample in taken:
             self._say(sample)
-        if not taken:
-            time.sleep(0.005)
+        time.sleep(self.options.read_pause_ms / 1000 if taken else 0.005)
 
     def _say(self, sample: Any) -> None:
         info = sample.sample_info

@@ -105,6 +105,8 @@ def endpoint_qos(o: Arguments) -> ddsi.Qos:
         history=ddsi.KeepLast(o.depth) if o.depth else ddsi.KeepAll(),
         writer_data_lifecycle=ddsi.WriterDataLifecycle(autodispose_unregistered_instances=False),
     )
+    if o.max_samples:
+        qos |= ddsi.Qos(resource_limits=ddsi.ResourceLimits(max_samples=o.max_samples))
     if o.representation:
         chosen = ddsi.XCDR2 if o.representation == 2 else ddsi.XCDR1
         qos |= ddsi.Qos(data_representation=ddsi.DataRepresentation(chosen))
@@ -181,6 +183,8 @@ class Taker:
             o = self.options
             if self.samples >= o.count and self.has_disposed >= o.dispose and self.has_no_writers >= o.unregister:
                 self.complete.set()
+            if o.read_pause_ms:
+                await trio.sleep(o.read_pause_ms / 1000)
 
     def _say(self, sample: Any) -> None:
         if sample.info.valid_data:

@@ -156,6 +156,13 @@ static void set_endpoint(Qos& qos)
     qos.resource_limits().max_instances = 20;
     qos.resource_limits().max_samples_per_instance = 5000;
     qos.resource_limits().max_samples = 100000;
+    if (o.max_samples > 0)
+    {
+        qos.resource_limits().max_instances = 1;
+        qos.resource_limits().max_samples_per_instance = o.max_samples;
+        qos.resource_limits().max_samples = o.max_samples;
+        qos.resource_limits().allocated_samples = 0;
+    }
     qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
 }
 
@@ -269,6 +276,7 @@ public:
             keys_[info.instance_handle] = key_of(s);
             say_sample("SAMPLE", s);
             ++samples_;
+            sleep_ms(o.read_pause_ms);
         }
         else if (info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE)
         {
@@ -338,6 +346,12 @@ int main(int argc, char** argv)
     }
     DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
     qos.name(o.name);
+    if (o.lease_s > 0)
+    {
+        auto& discovery = qos.wire_protocol().builtin.discovery_config;
+        discovery.leaseDuration = {o.lease_s, 0};
+        discovery.leaseDuration_announcementperiod = {0, 1000000000u / 4 * 3};
+    }
     set_transport(qos);
     if (o.store != nullptr)
     {

@@ -15,6 +15,7 @@ enum kind { SHAPE, PLAIN, OPEN, BLOB, KEYED_BLOB };
 
 struct options {
   int domain, count, interval_ms, wait_s, linger_ms, size, depth, representation, blob_octets, readers;
+  int lease_s, read_pause_ms, max_samples;
   int best_effort, is_volatile, dispose, unregister, keyless, appendable, gate, hold, unicast;
   const char *topic, *partitions, *address, *store, *name, *governance;
   char *colors[16];
@@ -121,7 +122,7 @@ static struct options parse_options(int argc, char **argv)
   o.topic = "Square", o.address = "127.0.0.1", o.name = "alice", o.governance = "governance.p7s";
   char *colors = strdup("BLUE");
   int c;
-  while ((c = getopt(argc, argv, "d:t:c:n:i:w:l:s:h:x:P:B:M:a:k:p:g:bvDUKAGHu")) != -1)
+  while ((c = getopt(argc, argv, "d:t:c:n:i:w:l:s:h:x:P:B:M:a:k:p:g:L:z:r:bvDUKAGHu")) != -1)
     switch (c) {
     case 'd': o.domain = atoi(optarg); break;
     case 't': o.topic = optarg; break;
@@ -140,6 +141,9 @@ static struct options parse_options(int argc, char **argv)
     case 'k': o.store = optarg; break;
     case 'p': o.name = optarg; break;
     case 'g': o.governance = optarg; break;
+    case 'L': o.lease_s = atoi(optarg); break;
+    case 'z': o.read_pause_ms = atoi(optarg); break;
+    case 'r': o.max_samples = atoi(optarg); break;
     case 'b': o.best_effort = 1; break;
     case 'v': o.is_volatile = 1; break;
     case 'D': o.dispose = 1; break;

@@ -56,6 +56,9 @@ class Arguments(argparse.Namespace):
     store: str
     name: str
     governance: str
+    lease_s: int
+    read_pause_ms: int
+    max_samples: int
 
     @property
     def is_publisher(self) -> bool:
@@ -84,6 +87,9 @@ def parse_arguments() -> Arguments:
     parser.add_argument("-k", dest="store", default="")
     parser.add_argument("-p", dest="name", default="alice")
     parser.add_argument("-g", dest="governance", default="governance.p7s")
+    parser.add_argument("-L", dest="lease_s", type=int, default=0)
+    parser.add_argument("-z", dest="read_pause_ms", type=int, default=0)
+    parser.add_argument("-r", dest="max_samples", type=int, default=0)
     flags = {
         "-b": "best_effort",
         "-v": "volatile",
