@@ -68,7 +68,7 @@ class Benchmark:
 
     ``measure(side, session)`` measures one side once and returns a value for each figure's name; what else
     it returns (processor time, counts) is kept as a detail.  It raises WorkerFailed.  ``sides``: in turn, in
-    this order.
+    this order.  ``is_long``: it takes minutes, and comes out much the same each time, so it is measured once.
     """
 
     name: str
@@ -76,3 +76,4 @@ class Benchmark:
     figures: tuple[Figure, ...]
     measure: Callable[[Side, Session], Mapping[str, float]]
     sides: tuple[Side, ...] = (OURS, PEER)
+    is_long: bool = False

@@ -14,6 +14,8 @@ from .worker import WorkerFailed
 
 __all__ = ["Plan", "Report", "run_all"]
 
+_LONG_DEADLINE_S = 1800.0
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -57,10 +59,11 @@ def _run(benchmark: Benchmark, plan: Plan, report: Report) -> list[Row]:
             notes.append(note)
             if note not in report.notes:
                 report.notes.append(note)
-    for _ in range(plan.rounds):
+    deadline_s = max(plan.deadline_s, _LONG_DEADLINE_S) if benchmark.is_long else plan.deadline_s
+    for _ in range(1 if benchmark.is_long else plan.rounds):
         for side in list(sides):
             try:
-                with Session(scale=plan.scale, deadline_s=plan.deadline_s) as session:
+                with Session(scale=plan.scale, deadline_s=deadline_s) as session:
                     values = dict(benchmark.measure(side, session))
                 _check_complete(benchmark, values)
             except WorkerFailed as error:

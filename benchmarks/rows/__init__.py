@@ -4,6 +4,7 @@ from benchmarks.benchmark import Benchmark
 
 from . import (
     codec,
+    discovery,
     floors,
     footprint,
     hooks,
@@ -24,6 +25,7 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     *round_trip.BENCHMARKS,
     *matching.BENCHMARKS,
     *footprint.BENCHMARKS,
+    *discovery.BENCHMARKS,
     *hooks.BENCHMARKS,
     *secured.BENCHMARKS,
     *security_handshake.BENCHMARKS,

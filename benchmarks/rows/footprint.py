@@ -14,6 +14,8 @@ __all__ = ["BENCHMARKS"]
 
 _IMPORT = "import"
 _MEMORY = "memory/idle"
+_GROWTH = "memory/1000-endpoints"
+_ENDPOINTS = 1_000
 _IMPORTS_A_ROUND = 3
 
 
@@ -30,10 +32,33 @@ def _measure_memory(side: Side, session: Session) -> Mapping[str, float]:
     return {_MEMORY: session.start(side, "idle", domain=session.domain).result()["mib"]}
 
 
-BENCHMARKS = tuple(
-    Benchmark(name, summary, (Figure(name, unit, Better.LOWER),), measure, (OURS, PEER, FLOOR))
-    for name, unit, summary, measure in (
-        (_IMPORT, "ms", "import what an application needs", _measure_import),
-        (_MEMORY, "MiB", "resident memory of an idle participant", _measure_memory),
-    )
+def _measure_growth(side: Side, session: Session) -> Mapping[str, float]:
+    endpoints = session.count(_ENDPOINTS, least=100)
+    watching = session.start(side, "watch", domain=session.domain)
+    watching.wait_ready()
+    session.start(side, "crowd", domain=session.domain, endpoints=endpoints).wait_ready()
+    return {_GROWTH: watching.result()["mib"] * _ENDPOINTS / endpoints}
+
+
+BENCHMARKS = (
+    Benchmark(
+        _IMPORT,
+        "import what an application needs",
+        (Figure(_IMPORT, "ms", Better.LOWER),),
+        _measure_import,
+        (OURS, PEER, FLOOR),
+    ),
+    Benchmark(
+        _MEMORY,
+        "resident memory of an idle participant",
+        (Figure(_MEMORY, "MiB", Better.LOWER),),
+        _measure_memory,
+        (OURS, PEER, FLOOR),
+    ),
+    Benchmark(
+        _GROWTH,
+        "what 1000 endpoints of another participant add to it",
+        (Figure(_GROWTH, "MiB", Better.LOWER),),
+        _measure_growth,
+    ),
 )

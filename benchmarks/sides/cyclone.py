@@ -22,7 +22,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from .memory import resident_mib
+from .memory import Growth, resident_mib
 from .protocol import PAYLOAD_BYTE, play, say_ready, summarise_round_trips
 
 QOS = Qos(Policy.Reliability.Reliable(duration(seconds=30)), Policy.History.KeepAll)
@@ -205,6 +205,33 @@ def idle(domain: int) -> dict[str, float]:
     return {"mib": used}
 
 
+CROWD_TOPICS = 100
+
+
+def crowd(domain: int, endpoints: int) -> None:
+    participant = DomainParticipant(domain)
+    topics = [Topic(participant, f"Crowd{number}", ShapeType) for number in range(min(endpoints, CROWD_TOPICS))]
+    there = []
+    for number in range(endpoints):
+        topic = topics[number // 2 % len(topics)]
+        there.append(DataReader(participant, topic, QOS) if number % 2 else DataWriter(participant, topic, QOS))
+    say_ready()
+    while there:
+        time.sleep(60)
+
+
+def watch(domain: int) -> dict[str, float]:
+    participant = DomainParticipant(domain)
+    time.sleep(1)
+    before = resident_mib()
+    say_ready()
+    growth = Growth()
+    while not growth.is_over(resident_mib() - before):
+        time.sleep(Growth.INTERVAL_S)
+    del participant
+    return {"mib": growth.latest}
+
+
 if __name__ == "__main__":
     play(
         {
@@ -217,5 +244,7 @@ if __name__ == "__main__":
             "await_company": await_company,
             "join": join,
             "idle": idle,
+            "crowd": crowd,
+            "watch": watch,
         }
     )

@@ -23,7 +23,7 @@ _REPEATS = 200
 _CALLS_A_REPEAT = 1_000
 
 _calls: Counter[str] = Counter()
-_given: dict[str, tuple[Any, ...]] = {}
+_given: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
 
 
 def _count(name: str) -> None:
@@ -32,7 +32,7 @@ def _count(name: str) -> None:
     @wraps(hook)
     def counted(self: Plaintext, *given: Any, **named: Any) -> Any:
         _calls[name] += 1
-        _given[name] = given
+        _given[name] = given, named
         return hook(self, *given, **named)
 
     setattr(Plaintext, name, counted)
@@ -47,7 +47,7 @@ def _counted(role: Callable[..., Awaitable[dict[str, float]]]) -> Callable[..., 
             _count(name)
         trio.run(partial(role, count=count, **options))
         calls = {name: number for name, number in _calls.items() if number > count / 100}  # the others come with time
-        seconds = sum(number * _seconds(hooks[name], _given[name]) for name, number in calls.items())
+        seconds = sum(number * _seconds(hooks[name], *_given[name]) for name, number in calls.items())
         return {
             "calls": sum(calls.values()) / count,
             "hooks_us": seconds / count * 1e6,
@@ -56,10 +56,11 @@ def _counted(role: Callable[..., Awaitable[dict[str, float]]]) -> Callable[..., 
     return run
 
 
-def _seconds(hook: Callable[..., object], given: tuple[Any, ...]) -> float:
+def _seconds(hook: Callable[..., object], given: tuple[Any, ...], named: dict[str, Any]) -> float:
     """Of one call, the loop around it included."""
-    names = [f"given_{place}" for place in range(len(given))]
-    timer = timeit.Timer(f"hook({', '.join(names)})", globals={"hook": hook, **dict(zip(names, given, strict=True))})
+    values = {f"given_{place}": value for place, value in enumerate(given)} | named
+    arguments = [*list(values)[: len(given)], *(f"{name}={name}" for name in named)]
+    timer = timeit.Timer(f"hook({', '.join(arguments)})", globals={"hook": hook, **values})
     return min(timer.repeat(_REPEATS, _CALLS_A_REPEAT)) / _CALLS_A_REPEAT
 
 

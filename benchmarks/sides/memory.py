@@ -4,7 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["resident_mib"]
+__all__ = ["Growth", "resident_mib"]
+
+
+class Growth:
+    """Tells from what is measured again and again when it has come to its end: it grew, and does so no more."""
+
+    INTERVAL_S = 0.2
+    _STILL_S = 2.0
+    _LEAST_MIB = 0.1
+
+    def __init__(self) -> None:
+        self.latest = 0.0
+        self._unchanged = 0
+
+    def is_over(self, mib: float) -> bool:
+        """``mib``: how much it is now; asked every INTERVAL_S."""
+        self._unchanged = self._unchanged + 1 if mib == self.latest >= self._LEAST_MIB else 0
+        self.latest = mib
+        return self._unchanged * self.INTERVAL_S >= self._STILL_S
 
 
 def resident_mib() -> float:

@@ -12,7 +12,7 @@ import trio
 import ddsi
 from ddsi import idl
 
-from .memory import resident_mib
+from .memory import Growth, resident_mib
 from .protocol import PAYLOAD_BYTE, play, say_ready, summarise_round_trips
 
 QOS = ddsi.Qos(reliability=ddsi.Reliable(max_blocking_time=30), history=ddsi.KeepAll())
@@ -200,6 +200,34 @@ async def idle(domain: int) -> dict[str, float]:
         return {"mib": resident_mib()}
 
 
+CROWD_TOPICS = 100
+
+
+async def crowd(domain: int, endpoints: int) -> None:
+    """Half writers and half readers, over as many topics as there are, or 100."""
+    async with ddsi.DomainParticipant(domain) as participant:
+        topics = [
+            ddsi.Topic(participant, f"Crowd{number}", ShapeType) for number in range(min(endpoints, CROWD_TOPICS))
+        ]
+        for number in range(endpoints):
+            topic = topics[number // 2 % len(topics)]
+            ddsi.DataReader(participant, topic, QOS) if number % 2 else ddsi.DataWriter(participant, topic, QOS)
+        say_ready()
+        await trio.sleep_forever()
+
+
+async def watch(domain: int) -> dict[str, float]:
+    """What this participant's memory grows by; another one's endpoints come once it is ready."""
+    async with ddsi.DomainParticipant(domain):
+        await trio.sleep(1)
+        before = resident_mib()
+        say_ready()
+        growth = Growth()
+        while not growth.is_over(resident_mib() - before):
+            await trio.sleep(Growth.INTERVAL_S)
+        return {"mib": growth.latest}
+
+
 def _run(role: Callable[..., Awaitable[dict[str, float] | None]]) -> Callable[..., dict[str, float] | None]:
     def run(**options: object) -> dict[str, float] | None:
         return trio.run(partial(role, **options))
@@ -221,5 +249,7 @@ if __name__ == "__main__":
             "offer_secret": _run(offer_secret),
             "learn_secret": _run(learn_secret),
             "idle": _run(idle),
+            "crowd": _run(crowd),
+            "watch": _run(watch),
         }
     )
