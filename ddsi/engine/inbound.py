@@ -207,6 +207,8 @@ class Inbound:
                 elif kind < 0x80 and kind not in _WITHOUT_EFFECT:  # vendors' own are to be skipped (RTPS 2.5 §8.3.4.1)
                     self._engine.dropped(DropReason.UNSUPPORTED, incoming.source, submessage_name(kind))
                 return raw.end
+        if envelope_start >= 0:
+            raise MalformedMessage("an envelope without its end", element="SEC_PREFIX", offset=envelope_start)
         return len(view)
 
     def _envelope(self, incoming: Incoming, octets: memoryview) -> None:

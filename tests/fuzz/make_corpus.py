@@ -1,4 +1,4 @@
-"""Make the inputs in ``corpus/``: ``python -m tests.fuzz.make_corpus``.
+"""Make the inputs in ``corpus/``: ``python -m tests.fuzz.make_corpus``, perhaps with the names of targets.
 
 One function per target yields what is hostile: a name that says what, the octets, and the verdict that is expected.
 Each class of weakness that is known of other implementations has at least one; they are from published advisories and
@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Sequence
 
 from tests.fuzz.corpus import EXPECTED, FOLDER
 from tests.fuzz.hostile_documents import DOCUMENT_MAKERS
 from tests.fuzz.hostile_envelopes import ENVELOPE_MAKERS
 from tests.fuzz.hostile_messages import MESSAGE_MAKERS, Made
+from tests.fuzz.hostile_secured import SECURED_MAKERS
 from tests.fuzz.hostile_tokens import TOKEN_MAKERS
 from tests.fuzz.identities import FOLDER as IDENTITIES
 from tests.fuzz.identities import make_keystore
@@ -25,16 +27,20 @@ MAKERS: dict[str, Callable[[], Iterator[Made]]] = {
     **TOKEN_MAKERS,
     **DOCUMENT_MAKERS,
     **ENVELOPE_MAKERS,
+    **SECURED_MAKERS,
 }
 
 
-def main() -> None:
-    """Whatever does not begin with ``found-`` is made anew."""
+def main(names: Sequence[str]) -> None:
+    """Whatever does not begin with ``found-`` is made anew, of the targets with these names or of all."""
     if not IDENTITIES.exists():
         make_keystore()
     expected = json.loads(EXPECTED.read_text()) if EXPECTED.exists() else {}
     made: dict[str, dict[str, str]] = {}
     for target in TARGETS:
+        if names and target not in names:
+            made[target] = expected.get(target, {})
+            continue
         folder = FOLDER / target
         found = {name: verdict for name, verdict in expected.get(target, {}).items() if name.startswith("found-")}
         for path in folder.glob("*"):
@@ -53,4 +59,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

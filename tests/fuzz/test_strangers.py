@@ -1,0 +1,59 @@
+"""Whatever strangers send: no error leaves the engine, no table exceeds its bound, and friends are served."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import pytest
+
+from tests.fuzz.strangers import Flood, tables
+
+MOST_GROWTH = 3 << 20
+"""Octets; the tables are full long before half of a flood is over."""
+
+
+def check(flood: Flood) -> None:
+    assert flood.is_friend_served()
+    assert flood.octets_sent() < flood.octets, "all of it together is no amplification"
+    for ear in (flood.plain, flood.secured):
+        assert ear.engine.drops.total() > 100
+    (peer,) = flood.secured.engine.participants.values()
+    assert peer.is_admitted, "nobody has pushed it out, and nobody else got in"
+
+
+def test_a_flood_of_strangers_leaves_every_table_within_its_bound() -> None:
+    """``Flood`` looks at all tables after every 200 datagrams."""
+    flood = Flood(1)
+    flood.run(4000)
+    check(flood)
+    largest = {table.name: table.size for table in flood.peaks["without security"]}
+    assert (largest["participants"], largest["hosts of one participant"]) == (100, 8)
+    assert all(largest[name] > 10 for name in ("endpoints", "instances", "octets of fragments")), "they fill"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 5))
+def test_however_long_it_lasts_it_takes_no_more_memory(seed: int) -> None:
+    flood = Flood(seed)
+    flood.run(5000)
+    tracemalloc.start()
+    try:
+        flood.run(5000)
+        before, _ = tracemalloc.get_traced_memory()
+        flood.run(5000)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    check(flood)
+    assert after - before < MOST_GROWTH
+
+
+def test_the_same_seed_makes_the_same_flood() -> None:
+    floods = [Flood(7), Flood(7)]
+    for flood in floods:
+        flood.run(400)
+    one, other = floods
+    assert one.plain.engine.drops == other.plain.engine.drops
+    assert one.secured.engine.drops == other.secured.engine.drops
+    assert tables(one.plain.engine) == tables(other.plain.engine)
+    assert (one.octets, one.octets_sent()) == (other.octets, other.octets_sent())
