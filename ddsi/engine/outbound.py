@@ -88,7 +88,8 @@ class Outbound:
         added = self._hooks.overhead(writer.guid, writer.receivers)
         writer.packer.capacity = self._max_message_octets - added.message
         writer.behavior.fragment_octets = fragment_octets_for(self._max_message_octets, self._fragment_size, added)
-        writer.joining_readers = frozenset(filter(self._hooks.opens_after_joining, writer.receivers))
+        if added.payload:
+            writer.joining_readers = frozenset(filter(self._hooks.opens_after_joining, writer.receivers))
 
     def message_size_changed(self, max_message_octets: int, writers: Iterable[LocalWriter]) -> None:
         """We send through other interfaces.  No message may be open; what is in a history keeps its fragments' size."""

@@ -29,6 +29,7 @@ from ..spi import HookEffect, SecurityHooks, SendMessage
 from ..structure import builtin_entity_ids as ids
 from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.sequence_number import NumberSet
+from ..structure.vendor import FAST_DDS, RTI, RTI_MICRO, TWINOAKS
 from ..trace.generic_message import generic_message_outline
 
 if TYPE_CHECKING:
@@ -105,8 +106,8 @@ class Quirk:
         """What security wants done: a handshake message, a token.  None leaves it undone."""
         return effect
 
-    def hear(self, submessage: Submessage) -> bool:
-        """Does this vendor understand a submessage, now that it is in clear?"""
+    def hear(self, sender: bytes, submessage: Submessage) -> bool:
+        """Does this vendor understand a submessage, now that it is in clear?  ``sender``: the participant's prefix."""
         return True
 
 
@@ -179,14 +180,17 @@ class AckNackCountZero(Quirk):
 class RefusesAckNackFromZero(Quirk):
     """Base 0 is malformed, unless one of the vendors sent it that are known for it."""
 
-    def hear(self, submessage: Submessage) -> bool:
-        return not (isinstance(submessage, AckNack) and submessage.reader_sn_state.base == 0)
+    def hear(self, sender: bytes, submessage: Submessage) -> bool:
+        if not isinstance(submessage, AckNack) or submessage.reader_sn_state.base != 0:
+            return True
+        participant = self.engine.participants.get(sender)
+        return participant is not None and participant.vendor_id in (FAST_DDS, RTI, RTI_MICRO, TWINOAKS)
 
 
 class DropsCountZero(Quirk):
     """HEARTBEAT and ACKNACK are compared with a count that begins at 0, so those that have it are never new."""
 
-    def hear(self, submessage: Submessage) -> bool:
+    def hear(self, sender: bytes, submessage: Submessage) -> bool:
         return not (isinstance(submessage, AckNack | Heartbeat) and submessage.count == 0)
 
 
@@ -225,7 +229,7 @@ class SealsBeforeCutting(Quirk):
 class OpensAfterJoining(Quirk):
     """The receiving side of the same: runs that were protected by themselves are joined, and cannot be opened."""
 
-    def hear(self, submessage: Submessage) -> bool:
+    def hear(self, sender: bytes, submessage: Submessage) -> bool:
         if not isinstance(submessage, DataFrag):
             return True
         return len(submessage.serialized_payload) < submessage.run_length + _LEAST_PAYLOAD_OVERHEAD

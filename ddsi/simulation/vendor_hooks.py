@@ -25,7 +25,7 @@ from ..messages.submessages import (
 )
 from ..spi import HookEffect, Octets, Outcome, Parts, Rejected, SecurityHooks
 from ..structure.errors import MalformedMessage
-from ..structure.guid import Guid, GuidPrefix
+from ..structure.guid import Guid
 from .quirks import Quirk
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["VendorHooks"]
 
+_PREFIX = slice(8, HEADER_LENGTH)
 _EntitySubmessage = AckNack | Data | DataFrag | Gap | Heartbeat | HeartbeatFrag | NackFrag
 
 
@@ -113,26 +114,29 @@ class VendorHooks:
 
     def understood(self, message: Octets) -> Octets:
         """A message as it came, without the submessages that this vendor does not understand."""
+        sender = bytes(message[_PREFIX])
         try:
             kept = [
                 bytes(message[raw.offset : raw.end])
                 for raw in iterate_submessages(message)
-                if self._hears(decode_submessage(raw))
+                if self._hears(sender, decode_submessage(raw))
             ]
         except MalformedMessage:
             return message  # that is for the engine to find out
         return bytes(message[:HEADER_LENGTH]) + b"".join(kept)
 
     def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
-        decoded = self._hooks.decode_message(message, GuidPrefix(source))
+        decoded = self._hooks.decode_message(message, source)
         return decoded if isinstance(decoded, Outcome) else self.understood(decoded)
 
     def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
-        decoded = self._hooks.decode_submessage(protected, GuidPrefix(source))
+        decoded = self._hooks.decode_submessage(protected, source)
         if isinstance(decoded, Outcome):
             return decoded
         (raw,) = iterate_submessages(decoded, start=0)
-        return decoded if self._hears(decode_submessage(raw)) else Rejected("this vendor does not understand it")
+        return (
+            decoded if self._hears(source, decode_submessage(raw)) else Rejected("this vendor does not understand it")
+        )
 
-    def _hears(self, submessage: Submessage) -> bool:
-        return not any(self._acts(quirk, not quirk.hear(submessage)) for quirk in self._quirks)
+    def _hears(self, sender: bytes, submessage: Submessage) -> bool:
+        return not any(self._acts(quirk, not quirk.hear(sender, submessage)) for quirk in self._quirks)

@@ -18,7 +18,7 @@ from ddsi.serialization.parameter_list import ParameterList
 from ddsi.simulation import VENDORS, Domain, LinkConditions, Node, NodeReader, NodeWriter, Vendor, invariants
 from ddsi.simulation import quirks as q
 from ddsi.simulation.scenario import Scenario
-from ddsi.simulation.vendors import CYCLONE_DDS, OPENDDS, RTI_CONNEXT, RUST_DDS
+from ddsi.simulation.vendors import CYCLONE_DDS, DUST_DDS, FAST_DDS, OPENDDS, RTI_CONNEXT, RUST_DDS
 from ddsi.spi import PLAINTEXT, Overhead
 from ddsi.spi.plaintext import Plaintext
 from ddsi.structure.cache_change import ChangeKind
@@ -106,14 +106,23 @@ def test_a_payload_is_called_non_standard_where_it_is_protected() -> None:
         (q.DropsCountZero, acknack(1, count=0), False),
         (q.DropsCountZero, acknack(1, count=1), True),
         (q.DropsCountZero, Heartbeat(READER_ID, WRITER_ID, 1, 1, 0), False),
-        (q.RefusesAckNackFromZero, acknack(0), False),
-        (q.RefusesAckNackFromZero, acknack(1), True),
         (q.OpensAfterJoining, fragment(bytes(1000 + 40)), False),  # a run that was protected by itself
         (q.OpensAfterJoining, fragment(bytes(1000 + 3)), True),  # one that was padded
     ],
 )
 def test_what_is_not_understood(quirk: type[q.Quirk], submessage: Submessage, is_heard: bool) -> None:
-    assert quirk(PLAINTEXT).hear(submessage) is is_heard
+    assert quirk(PLAINTEXT).hear(READER[:12], submessage) is is_heard
+
+
+def test_base_zero_is_understood_from_those_who_are_known_for_it() -> None:
+    domain = Domain(1)
+    cyclone, *others = [domain.node(vendor=vendor) for vendor in (CYCLONE_DDS, FAST_DDS, RTI_CONNEXT, DUST_DDS, None)]
+    assert domain.run_until(domain.are_introduced, 5)
+    quirk = q.RefusesAckNackFromZero(PLAINTEXT)
+    quirk.engine = cyclone.engine
+    assert [quirk.hear(node.guid[:12], acknack(0)) for node in others] == [True, True, False, False]
+    assert all(quirk.hear(node.guid[:12], acknack(1)) for node in others)
+    assert not quirk.hear(bytes(12), acknack(0)), "nobody knows who that is"
 
 
 def _octets(text: str) -> bytes:
