@@ -284,6 +284,11 @@ class ReaderHistoryCache:
 
     # --- what goes out -----------------------------------------------------------------------------------
 
+    @property
+    def has_news(self) -> bool:
+        """Has anything come since :meth:`seen`?"""
+        return self._has_news
+
     def seen(self) -> None:
         """The application is about to look: the next sample is news again."""
         self._has_news = False

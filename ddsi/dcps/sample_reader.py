@@ -128,7 +128,7 @@ class SampleReader(Entity, Generic[T]):
         raise NotImplementedError
 
     def _on_close(self) -> None:
-        self._news.unpark_all()
+        self._pump.woken(self._history, self._news)
 
     def _after_taking(self) -> None:
         """There is room again."""
@@ -140,11 +140,15 @@ class SampleReader(Entity, Generic[T]):
         """Until something may have changed.  What this task has written must not wait meanwhile."""
         self._history.seen()
         self._pump.before_waiting()
-        await self._news.park()
+        if self._pump.can_be_led:
+            await self._pump.lead(self._history)
+        else:
+            await self._news.park()
 
     def _has_news(self) -> None:
-        self._news.unpark_all()
-        self._changed.unpark_all()
+        self._pump.woken(self._history, self._news)
+        if self._changed:
+            self._changed.unpark_all()
 
     def _selection(
         self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int

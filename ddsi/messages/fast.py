@@ -75,13 +75,14 @@ def envelope_end(octets: Octets, start: int, end: int) -> int:
     if end - start < 32:
         return 0
     kind, flags, length = SUBMESSAGE_HEAD.unpack_from(octets, start + 24)
-    postfix = start + 28 + length
+    postfix: int = start + 28 + length
     if kind == _SEC_POSTFIX or not flags & 1 or not length or length & 3 or end - postfix < 4:
         return 0
     kind, flags, length = SUBMESSAGE_HEAD.unpack_from(octets, postfix)
     if kind != _SEC_POSTFIX or not flags & 1 or not length or length & 3 or end - postfix < 4 + length:
         return 0
-    return postfix + 4 + length
+    past: int = postfix + 4 + length
+    return past
 
 
 def heartbeat(reader_id: bytes, writer_id: bytes, first: int, last: int, count: int, *, final: bool) -> bytes:

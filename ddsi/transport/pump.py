@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import trio
 
+from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..config import Config
 from ..engine import Compute, Effect, Participant, ParticipantSetup, SendDatagram
 from ..spi import load_hooks
@@ -29,6 +30,7 @@ from ..structure.guid import GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos_policies import Properties
 from .interface_watch import watch_interfaces
+from .lead import Lead
 from .udp import UdpTransport
 
 if TYPE_CHECKING:
@@ -98,6 +100,8 @@ class Pump:
         self._limiter = trio.CapacityLimiter(_COMPUTE_THREADS)
         self._operations = 0
         self._last_yield = -math.inf
+        self._buffer = memoryview(bytearray(65536))
+        self._lead = Lead()
 
     def _configured_trace(self, config: Config, now: float) -> TraceSink | None:
         if not config.trace_file and not config.pcap_file:
@@ -126,6 +130,12 @@ class Pump:
     def now() -> float:
         """The engine's clock."""
         return trio.current_time()
+
+    @property
+    def _shared_socket(self) -> socket.socket | None:
+        """That the application's tasks may read: the one where samples come.  Of several, nobody could wait for all."""
+        unicast = self.transport.unicast
+        return unicast[0] if len(unicast) == 1 else None
 
     # --- running -----------------------------------------------------------------------------------------
 
@@ -160,32 +170,70 @@ class Pump:
             self._send_backlog_now()
         finally:
             self.is_closed = True
+            self._lead.disturb(None)
             # In this order: no task may wait for a socket that is closed, or for another one that gets its number.
             self._running.cancel()
             self._files.close()
 
     @trio.lowlevel.enable_ki_protection
     async def _receive(self, sock: socket.socket) -> None:
-        buffer = bytearray(65536)
-        view = memoryview(buffer)
-        engine, locator_of = self.engine, self.transport.locator_of
         while not self.is_closed:
             try:
-                await trio.lowlevel.wait_readable(sock)
+                if sock is self._shared_socket:
+                    await self._lead.deputise(sock)
+                else:
+                    await trio.lowlevel.wait_readable(sock)
             except trio.ClosedResourceError:  # its interface is gone
                 return
-            now = trio.current_time()
-            for _ in range(_BATCH):
-                try:
-                    octets, address = sock.recvfrom_into(buffer)
-                except BlockingIOError:
-                    break
-                except OSError:
-                    if sock.fileno() < 0:  # closed since this task was woken
-                        return
-                    continue  # an ICMP error for something sent before; it is not about this socket
-                engine.receive_datagram(view[:octets], locator_of(address), now)
-            self.settle()
+            self._read(sock, None)
+
+    def _read(self, sock: socket.socket, history: ReaderHistoryCache | None) -> None:
+        """Handle what is there, or so much of it that there is news in ``history``."""
+        now = trio.current_time()
+        view, engine, locator_of = self._buffer, self.engine, self.transport.locator_of
+        for count in range(_BATCH):
+            try:
+                octets, address = sock.recvfrom_into(view)
+            except BlockingIOError:
+                if not count:
+                    return
+                break
+            except OSError:
+                if sock.fileno() < 0:  # closed since this task was woken
+                    return
+                continue  # an ICMP error for something sent before; it is not about this socket
+            engine.receive_datagram(view[:octets], locator_of(address), now)
+            if history is not None and history.has_news:
+                break
+        self.settle()
+
+    @property
+    def can_be_led(self) -> bool:
+        """May a task that waits for samples call :meth:`lead`?"""
+        return self._lead.is_free and self._shared_socket is not None and self._nursery is not None
+
+    @trio.lowlevel.enable_ki_protection
+    async def lead(self, history: ReaderHistoryCache) -> None:
+        """Read the unicast socket in the calling task until there is news in ``history``, or may be."""
+        sock = self._shared_socket
+        assert sock is not None
+        lead = self._lead
+        lead.take(history)
+        try:
+            self._read(sock, history)
+            while not (history.has_news or lead.is_disturbed or sock.fileno() < 0):
+                await lead.wait(sock)
+                self._operations, self._last_yield = 0, trio.current_time()
+                self._read(sock, history)
+        finally:
+            lead.leave()
+
+    def woken(self, history: ReaderHistoryCache, waiting: trio.lowlevel.ParkingLot) -> None:
+        """There is news in ``history``, or it is closed: wake the tasks ``waiting`` for it, and who leads."""
+        if waiting:
+            self._lead.offer()
+            waiting.unpark_all()
+        self._lead.disturb(history)
 
     @trio.lowlevel.enable_ki_protection
     async def _keep_time(self) -> None:
