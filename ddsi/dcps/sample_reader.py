@@ -144,6 +144,7 @@ class SampleReader(Entity, Generic[T]):
             await self._pump.lead(self._history)
         else:
             await self._news.park()
+            self._pump.has_yielded()
 
     def _has_news(self) -> None:
         self._pump.woken(self._history, self._news)

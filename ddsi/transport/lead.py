@@ -16,6 +16,9 @@ from ..behavior.reader_history_cache import ReaderHistoryCache
 
 __all__ = ["Lead"]
 
+# Of the scheduler: who was woken takes its sample in the first, may have to yield for a second, and then waits again.
+_ROUNDS_OF_GRACE = 3
+
 
 class Lead:
     """Of one socket.  ``is_free``: nobody waits for it now."""
@@ -66,7 +69,7 @@ class Lead:
         """Wait for the socket, as the deputy: not while anybody leads, or may do so presently."""
         if self._is_offered:
             self._is_offered = False
-            for _ in range(2):  # who was woken has run after one round, and after another waits again, if it does
+            for _ in range(_ROUNDS_OF_GRACE):
                 await trio.lowlevel.checkpoint()
         while not self.is_free:
             await self._deputy.park()

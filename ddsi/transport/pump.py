@@ -223,7 +223,7 @@ class Pump:
             self._read(sock, history)
             while not (history.has_news or lead.is_disturbed or sock.fileno() < 0):
                 await lead.wait(sock)
-                self._operations, self._last_yield = 0, trio.current_time()
+                self.has_yielded()
                 self._read(sock, history)
         finally:
             lead.leave()
@@ -373,6 +373,11 @@ class Pump:
         action()
 
     # --- fairness ----------------------------------------------------------------------------------------
+
+    def has_yielded(self) -> None:
+        """The calling task has waited, so others had their turn."""
+        self._operations = 0
+        self._last_yield = trio.current_time()
 
     async def checkpoint(self, now: float) -> None:
         """A cancellation point for operations that need not wait; yields after 64 of them, or a millisecond."""
