@@ -6,15 +6,18 @@ runs on the machine is neither disturbed nor met.
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import queue
+import shutil
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -122,4 +125,15 @@ def _environment(tag: str) -> dict[str, str]:
     environment = dict(os.environ)
     for variable, root in (("DDSI_URI", "DDSI"), ("CYCLONEDDS_URI", "CycloneDDS")):
         environment[variable] = f"<{root}><Domain>{_INTERFACE}{discovery}</Domain></{root}>"
+    if environment.pop("PYTHONDONTWRITEBYTECODE", ""):
+        environment["PYTHONPYCACHEPREFIX"] = _bytecode_folder()
     return environment
+
+
+@cache
+def _bytecode_folder() -> str:
+    """Where nobody may keep bytecode, it lies here for this run: else each process would compile all that it imports,
+    which is never so where packages are installed."""
+    folder = tempfile.mkdtemp(prefix="benchmark-bytecode-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
