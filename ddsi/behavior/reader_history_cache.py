@@ -1,6 +1,7 @@
 """ReaderHistoryCache: the samples that an application has not taken yet, by instance.  Other name: RHC.
 
 DDS 1.4 §2.2.2.5 (Subscription Module: states, ranks, generation counts), §2.2.3.18-19 (HISTORY, RESOURCE_LIMITS).
+What is let in at all, and for how long, its :class:`.sample_gate.SampleGate` decides.
 Samples come here in the order that RTPS established and leave in the order of arrival.  It holds octets, not data:
 deserialising is done when a sample is taken, by whoever takes it.
 """
@@ -24,6 +25,8 @@ from ..structure.sample_info import (
     SampleState,
     ViewState,
 )
+from .instance import Instance
+from .sample_gate import SampleGate
 
 __all__ = ["Instance", "ReaderHistoryCache", "SampleSelector"]
 
@@ -36,45 +39,12 @@ _READ = SampleState.READ
 SampleSelector = Callable[[SampleInfo], bool]
 
 
-class Instance:
-    """One instance: its samples (oldest first), who writes it, and its states.
-
-    ``end_count``: how many of the samples have no data, but tell of an end.
-    """
-
-    __slots__ = (
-        "disposed_generation_count",
-        "end_count",
-        "key",
-        "no_writers_generation_count",
-        "rank",
-        "samples",
-        "state",
-        "view_state",
-        "writers",
-    )
-
-    def __init__(self, key: bytes) -> None:
-        self.key = key
-        self.samples: deque[SampleInfo] = deque()
-        self.writers: set[bytes] = set()
-        self.state = _ALIVE
-        self.view_state = _NEW
-        self.end_count = 0
-        self.disposed_generation_count = 0
-        self.no_writers_generation_count = 0
-        self.rank = 0
-
-    @property
-    def generation(self) -> int:
-        return self.disposed_generation_count + self.no_writers_generation_count
-
-
 class ReaderHistoryCache:
     """A ChangeSink for application readers.
 
     ``on_news`` is called when something can be read and the last such call has been cleared by :meth:`seen`;
-    ``on_rejected`` with the name of a limit, for best-effort samples that find no room.
+    ``on_rejected`` with the name of a limit, for best-effort samples that find no room; ``on_timer`` when
+    :meth:`handle_timeout` is wanted earlier than it was told before.
     """
 
     def __init__(
@@ -86,10 +56,13 @@ class ReaderHistoryCache:
         clock_offset: float = 0.0,
         on_news: Callable[[], None] = lambda: None,
         on_rejected: Callable[[str], None] = lambda reason: None,
+        on_timer: Callable[[float], None] = lambda due: None,
+        wall_time: Callable[[float], float] | None = None,
     ) -> None:
         """``max_octets``, ``max_instances``: bounds beside the QoS, so that no peer can fill the memory.
 
-        ``clock_offset``: seconds to add to the engine's clock to have wall time.
+        ``clock_offset``: seconds to add to the engine's clock to have wall time, as it was in the beginning;
+        ``wall_time(now)`` is it now, if somebody may set it meanwhile.
         """
         limits = qos.resource_limits
         unlimited = LENGTH_UNLIMITED
@@ -112,6 +85,7 @@ class ReaderHistoryCache:
         self._order: deque[SampleInfo] = deque()
         self._removed_count = 0
         self._octets = 0
+        self._gate = SampleGate(qos, wall_time=wall_time or (lambda now: now + clock_offset), on_timer=on_timer)
 
     def __len__(self) -> int:
         """How many samples can be read or taken."""
@@ -140,6 +114,9 @@ class ReaderHistoryCache:
         if change.kind is not ChangeKind.ALIVE:
             self._add_end(instance, change, now)
             return True
+        gate = self._gate
+        if not gate.is_open and not gate.admits(instance, change, now):
+            return True
         samples = instance.samples
         if self._depth and len(samples) - instance.end_count >= self._depth:
             self._push_out(instance)
@@ -158,16 +135,31 @@ class ReaderHistoryCache:
         samples.append(info)
         self._order.append(info)
         self._octets += len(change.payload)
+        if not gate.is_open:
+            gate.admitted(instance, info, change, now)
+            if gate.expiring > 2 * len(self) + _COMPACT_ABOVE:
+                gate.forget_all_but(info for info in self._order if info._change is not None)
         if not self._has_news:
             self._has_news = True
             self._on_news()
         return True
+
+    def writer_matched(self, writer: Guid, qos: EndpointQos) -> None:
+        """A writer was matched, or has other policies now."""
+        self._gate.writer_matched(writer, qos)
+
+    def writer_unmatched(self, writer: Guid, now: float) -> None:
+        """A writer is gone: it writes no instance, and its policies are forgotten."""
+        self.writer_lost(writer, now)
+        self._gate.writer_unmatched(writer)
 
     def writer_lost(self, writer: Guid, now: float) -> None:
         """A writer was unmatched, or its liveliness was lost: it no longer writes any instance."""
         for instance in list(self._instances.values()):
             if writer in instance.writers:
                 instance.writers.discard(writer)
+                if instance.owner == writer:
+                    instance.owner = None
                 if not instance.writers and instance.state is _ALIVE:
                     nobody = CacheChange(ChangeKind.NOT_ALIVE_UNREGISTERED, writer, 0, b"", instance.key)
                     self._end(instance, InstanceState.NOT_ALIVE_NO_WRITERS, nobody, now)
@@ -190,10 +182,13 @@ class ReaderHistoryCache:
 
     def _add_end(self, instance: Instance, change: CacheChange, now: float) -> None:
         """Dispose, unregister, or both.  DDS 1.4 figure 2.11: disposed wins until somebody writes again."""
-        if change.kind & StatusInfo.DISPOSED and instance.state is not InstanceState.NOT_ALIVE_DISPOSED:
+        may_dispose = self._gate.may_write(change.writer_guid, instance)
+        if change.kind & StatusInfo.DISPOSED and may_dispose and instance.state is not InstanceState.NOT_ALIVE_DISPOSED:
             self._end(instance, InstanceState.NOT_ALIVE_DISPOSED, change, now)
         if change.kind & StatusInfo.UNREGISTERED:
             instance.writers.discard(change.writer_guid)
+            if instance.owner == change.writer_guid:
+                instance.owner = None
             if not instance.writers and instance.state is _ALIVE:
                 self._end(instance, InstanceState.NOT_ALIVE_NO_WRITERS, change, now)
             self._purge(instance)
@@ -205,6 +200,7 @@ class ReaderHistoryCache:
         a thousand times does not fill the cache.
         """
         instance.state = state
+        self._gate.ended(instance.key)
         last = instance.samples[-1] if instance.samples else None
         if last is None or last.valid_data or last.sample_state is _READ:
             if self._depth and instance.end_count:
@@ -281,6 +277,22 @@ class ReaderHistoryCache:
         """Nobody writes it and nothing is left to take: forget it, so that instances come and go without end."""
         if not instance.samples and not instance.writers and instance.state is not _ALIVE:
             self._instances.pop(instance.key, None)
+
+    # --- what does not stay --------------------------------------------------------------------------------
+
+    def handle_timeout(self, now: float) -> list[bytes]:
+        """Drop what has expired; returns the instances that missed their deadline, whose owners lose them."""
+        for info in self._gate.expired(now):
+            instance = self._instances.get(info.instance_handle)
+            if instance is not None and any(known is info for known in instance.samples):  # else it was taken
+                self._remove(instance, info)
+                self._purge(instance)
+        missed = self._gate.missed(now)
+        for key in missed:
+            if key in self._instances:
+                self._instances[key].owner = None
+        self._gate.arm()
+        return missed
 
     # --- what goes out -----------------------------------------------------------------------------------
 

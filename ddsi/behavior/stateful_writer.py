@@ -21,6 +21,7 @@ from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason
 from .acked_numbers import AckedNumbers
+from .deadline_watch import DeadlineWatch
 from .dropping import WhenDropped, drop_silently
 from .filtered import directed_heartbeat_range, gap_for, is_irrelevant
 from .reader_proxy import ReaderProxy
@@ -77,6 +78,7 @@ class StatefulWriter:
         self._in_flight: deque[tuple[int, int]] = deque()
         self._in_flight_octets = 0
         self._expiries: deque[tuple[float, int]] = deque()
+        self.deadline = DeadlineWatch(qos.deadline.period) if qos.deadline.period < math.inf else None
 
     def __repr__(self) -> str:
         sent = f"sent {self.next_unsent_sn - 1} of {self.cache.last_sn}"
@@ -91,8 +93,8 @@ class StatefulWriter:
 
     @property
     def needs_key(self) -> bool:
-        """Must changes come with their key: for the history's sake, or for readers of this participant?"""
-        return self.cache.keeps_instances or bool(self.local_readers)
+        """Must changes come with their key: for the history's or the deadline's sake, or for readers of our own?"""
+        return self.cache.keeps_instances or bool(self.local_readers) or self.deadline is not None
 
     def lacks_room(self, octets: int, key: bytes) -> str | None:
         """Why one more change of so many octets has to wait, in words; None when it has not to."""
@@ -139,9 +141,19 @@ class StatefulWriter:
         if lifespan != math.inf and kind is ChangeKind.ALIVE:  # DDS 1.4 §2.2.3.16: data expires, not the end of it
             change.expiry = now + lifespan
             self._expiries.append((change.expiry, change.sequence_number))
+        if self.deadline is not None:
+            self._expected(kind, key, now)
         if self._reliable_readers:
             self.heartbeat.written(now)
         return change
+
+    def _expected(self, kind: ChangeKind, key: bytes, now: float) -> None:
+        """The next sample of the instance is expected within the DEADLINE; after its end none is."""
+        assert self.deadline is not None
+        if kind is ChangeKind.ALIVE:
+            self.deadline.heard(key, now)
+        else:
+            self.deadline.forget(key)
 
     def sends_directly(self, change: CacheChange) -> bool:
         """The fast path: nothing waits before this change, it fits, and it goes to everybody as one DATA.
@@ -366,7 +378,8 @@ class StatefulWriter:
 
     def next_deadline(self) -> float:
         expiry = self._expiries[0][0] if self._expiries else math.inf
-        return min(self.heartbeat.due, self._pace_due, expiry)
+        missed = self.deadline.due if self.deadline is not None else math.inf
+        return min(self.heartbeat.due, self._pace_due, expiry, missed)
 
     def handle_timeout(self, now: float) -> list[WriterTransmission]:
         out: list[WriterTransmission] = []

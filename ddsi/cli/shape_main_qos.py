@@ -51,10 +51,6 @@ def unsupported(options: ShapeMainOptions) -> str | None:
         ("Presentation Ordered Access", options.is_ordered),
         ("Presentation Access Scope", options.access_scope in ("t", "g")),
         ("Content filtered topic", filters),
-        ("Ownership EXCLUSIVE", options.ownership_strength >= 0),
-        ("Deadline", options.deadline_ms > 0),
-        ("Time based filter", not options.publishes and options.time_filter_ms > 0),
-        ("Lifespan", options.publishes and options.lifespan_ms > 0),
     )
     return next((f"{feature} = not supported" for feature, is_wanted in features if is_wanted), None)
 

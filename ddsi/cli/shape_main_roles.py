@@ -34,14 +34,21 @@ class Role:
         raise NotImplementedError
 
     async def run(self) -> None:
-        """As many rounds as were asked for, a period between each two."""
+        """As many rounds as were asked for, a period from the beginning of one to that of the next.
+
+        A round that is late is played at once, and those after it follow at its distance: there is no catching up.
+        """
         rounds = 0
+        due: float | None = None
         while not self.end.is_set():
             await self.play_round(rounds)
             rounds += 1
             if rounds == self.options.num_iterations:
                 break
-            with trio.move_on_after(self.period_s):
+            with trio.move_on_after(self.period_s) as pause:
+                now = pause.deadline - self.period_s
+                due = pause.deadline if due is None else max(due + self.period_s, now)
+                pause.deadline = due
                 await self.end.wait()
 
     @property

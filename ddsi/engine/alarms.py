@@ -29,7 +29,8 @@ class Timer(Enum):
 
     SPDP = "announce ourselves"
     LEASE = "a remote participant has been silent for its lease"
-    WRITER = "a writer's heartbeat, pace or lifespan"
+    WRITER = "a writer's heartbeat, pace, lifespan or deadline"
+    READER = "a reader's lifespan or deadline"
     ACKNACK = "a reader's answer to one writer"
     ASSERTION = "assert automatic liveliness"
     WRITER_LIVELINESS = "a local manual writer was not asserted"
@@ -76,6 +77,9 @@ class Alarms:
         writer.timer_due = deadline
         self._timers.set((Timer.WRITER, writer.guid), deadline)
 
+    def reader(self, guid: Guid, deadline: float) -> None:
+        self._timers.set((Timer.READER, guid), deadline)
+
     def answer(self, reader: Guid, writer: Guid, deadline: float) -> None:
         self._timers.set((Timer.ACKNACK, reader, writer), deadline)
 
@@ -101,6 +105,9 @@ class Alarms:
         for timer in (Timer.WRITER, Timer.LINGER, Timer.WRITER_LIVELINESS):
             self._timers.cancel((timer, guid))
 
+    def forget_reader(self, guid: Guid) -> None:
+        self._timers.cancel((Timer.READER, guid))
+
     # --- due ---------------------------------------------------------------------------------------------
 
     def _fire(self, key: Hashable, now: float) -> None:
@@ -115,6 +122,8 @@ class Alarms:
                 engine.discovery.lease_due(subjects[0], now)
             case Timer.ACKNACK:
                 engine.answer_writer(subjects[0], subjects[1], now)
+            case Timer.READER:
+                engine.timeliness.reader_due(subjects[0], now)
             case Timer.ASSERTION:
                 engine.liveliness.assert_automatic(now)
                 self.assertion(now + engine.liveliness.assertion_period())
@@ -135,6 +144,7 @@ class Alarms:
         match timer:
             case Timer.WRITER:
                 writer.timer_due = math.inf
+                engine.timeliness.writer_due(writer, now)
                 engine.writer_answers(writer, writer.behavior.handle_timeout(now))
             case Timer.WRITER_LIVELINESS:
                 engine.liveliness.writer_due(writer, now)

@@ -21,8 +21,10 @@ from ..structure.status import (
     InconsistentTopic,
     LivelinessChanged,
     LivelinessLost,
+    OfferedDeadlineMissed,
     OfferedIncompatibleQos,
     PublicationMatched,
+    RequestedDeadlineMissed,
     RequestedIncompatibleQos,
     SampleLost,
     SampleRejected,
@@ -58,6 +60,7 @@ class LocalWriter:
         "assertion_due",
         "behavior",
         "data",
+        "deadline",
         "guid",
         "has_fresh_samples",
         "has_lost_liveliness",
@@ -86,6 +89,7 @@ class LocalWriter:
         self.incompatible = OfferedIncompatibleQos()
         self.inconsistent = InconsistentTopic()
         self.liveliness = LivelinessLost()
+        self.deadline = OfferedDeadlineMissed()
         self.timer_due = float("inf")
         self.assertion_due = float("inf")
         self.has_lost_liveliness = False
@@ -121,6 +125,11 @@ class LocalWriter:
         self.liveliness = replace(self.liveliness, total_count=self.liveliness.total_count + 1, total_count_change=1)
         return self.liveliness
 
+    def deadline_missed(self, key: bytes) -> Status:
+        total = self.deadline.total_count + 1
+        self.deadline = OfferedDeadlineMissed(total_count=total, total_count_change=1, last_instance_handle=key)
+        return self.deadline
+
 
 @dataclass(slots=True)
 class LocalReader:
@@ -136,6 +145,7 @@ class LocalReader:
     matched: SubscriptionMatched = SubscriptionMatched()
     incompatible: RequestedIncompatibleQos = RequestedIncompatibleQos()
     liveliness: LivelinessChanged = LivelinessChanged()
+    deadline: RequestedDeadlineMissed = RequestedDeadlineMissed()
     lost: SampleLost = SampleLost()
     rejected: SampleRejected = SampleRejected()
     inconsistent: InconsistentTopic = InconsistentTopic()
@@ -181,6 +191,11 @@ class LocalReader:
     def samples_lost(self, count: int, reason: str) -> Status:
         self.lost = SampleLost(total_count=self.lost.total_count + count, total_count_change=count, reason=reason)
         return self.lost
+
+    def deadline_missed(self, key: bytes) -> Status:
+        total = self.deadline.total_count + 1
+        self.deadline = RequestedDeadlineMissed(total_count=total, total_count_change=1, last_instance_handle=key)
+        return self.deadline
 
     def sample_rejected(self, reason: str) -> Status:
         total = self.rejected.total_count + 1

@@ -157,6 +157,7 @@ class Matchmaker:
         elif proxy is not None:
             if self._still_admits(reader.guid, proxy.data, data):
                 proxy.data = data
+                _tell_history(reader, data)
                 proxy.locators = participant.user_traffic(data.unicast)
             else:
                 self.unmatch_writer(reader, data.guid, LossReason.REJECTED_BY_SECURITY, now)
@@ -191,6 +192,7 @@ class Matchmaker:
         engine = self._engine
         participant = engine.participants[data.guid[:12]]
         self.attach_writer(reader, data, participant, participant.user_traffic(data.unicast), now)
+        _tell_history(reader, data)
         self._note_matched(reader.guid, data.guid, data.topic_name)
         engine.status(reader.guid, reader.match_changed(data.guid, 1))
         engine.status(reader.guid, reader.liveliness_changed(data.guid, alive=1, not_alive=0))
@@ -224,6 +226,7 @@ class Matchmaker:
         engine = self._engine
         reader_proxy = writer.behavior.matched_local_reader_add(reader.data, now)
         writer_proxy = reader.behavior.matched_writer_add(writer.data, (), now, is_local=True)
+        _tell_history(reader, writer.data)
         writer_proxy.reorder.next_sn = reader_proxy.history_sn + 1
         writer_proxy.last_seq = reader_proxy.history_sn
         self._note_matched(writer.guid, reader.guid, writer.data.topic_name)
@@ -249,7 +252,7 @@ class Matchmaker:
         engine.hooks.unmatch(reader.guid, guid)
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
-            reader.history.writer_lost(guid, now)
+            reader.history.writer_unmatched(guid, now)
         engine.status(reader.guid, reader.match_changed(guid, -1))
         alive = proxy is None or proxy.is_alive
         engine.status(
@@ -280,7 +283,7 @@ class Matchmaker:
         alive = proxy is None or proxy.is_alive
         self._engine.recorder.unmatched(writer.guid, reader.guid, writer.data.topic_name, reason)
         if reader.history is not None:
-            reader.history.writer_lost(writer.guid, now)
+            reader.history.writer_unmatched(writer.guid, now)
         engine.status(writer.guid, writer.match_changed(reader.guid, -1))
         engine.status(reader.guid, reader.match_changed(writer.guid, -1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-int(alive), not_alive=int(alive) - 1))
@@ -353,3 +356,9 @@ class Matchmaker:
             del self.refusals[pair]
         for pair in [pair for pair in self._pending if local in pair]:
             self._no_longer_pending(*pair)
+
+
+def _tell_history(reader: LocalReader, data: DiscoveredWriterData) -> None:
+    """Whose samples are coming: how strong the writer is, and how long they live."""
+    if reader.history is not None:
+        reader.history.writer_matched(data.guid, data.qos)

@@ -67,6 +67,7 @@ from .local_endpoints import KeyCodec, LocalReader, LocalWriter
 from .matchmaker import Matchmaker
 from .outbound import Outbound, fragment_octets_for
 from .recorder import Recorder
+from .timeliness import Timeliness
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
@@ -161,6 +162,7 @@ class Participant:
         self.inbound = Inbound(self)
         self.matchmaker = Matchmaker(self)
         self.liveliness = Liveliness(self)
+        self.timeliness = Timeliness(self)
         self.admission = AdmissionDesk(self)
         self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
         self.builtin_readers = BuiltinTopicReaders(self)
@@ -319,6 +321,8 @@ class Participant:
             clock_offset=self._wall_clock() / 1e9 - now,
             on_news=lambda: self._effects.append(DataAvailable(guid)),
             on_rejected=lambda reason: self._sample_rejected(guid, reason),
+            on_timer=lambda due: self.alarms.reader(guid, due),
+            wall_time=lambda now: self._wall_clock() / 1e9,
         )
         reader = self.add_reader(data, history, keys)
         reader.behavior.history = self.recorder.delivering(guid, history)
@@ -367,6 +371,7 @@ class Participant:
         self.hooks.local_endpoint_deleted(reader.guid)
         self.discovery.announce_gone(reader, now)
         del self.local_readers[reader.guid]
+        self.alarms.forget_reader(reader.guid)
         _remove_from_topic(self._readers_by_topic, reader.data.topic_name, reader.guid)
         self.recorder.endpoint_closed(reader.guid)
 

@@ -12,6 +12,7 @@ hold at any moment, others only once nothing is written any more and the network
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 
@@ -90,21 +91,25 @@ def _is_same(received: CacheChange, original: CacheChange) -> bool:
 
 
 def _taking_flaws(reader: NodeReader) -> Iterator[str]:
-    """A KEEP_ALL reader's application gets each sample that its history accepted, once."""
+    """A KEEP_ALL reader's application gets each sample that its history accepted, once, but for what expired before."""
     if not reader.takes or reader.is_deleted or not isinstance(reader.local.data.qos.history, KeepAll):
         return
-    taken = [(bytes(change.writer_guid), change.sequence_number) for info, change in reader.taken if info.valid_data]
+    taken = Counter(
+        (bytes(change.writer_guid), change.sequence_number) for info, change in reader.taken if info.valid_data
+    )
     given = [
-        (bytes(change.writer_guid), change.sequence_number)
+        change
         for sessions in reader.sessions.values()
         for session in sessions
         for change in session.changes
         if change.kind is ChangeKind.ALIVE
     ]
     # A best-effort reader without room accepts a sample only to reject it.
-    rejected = reader.local.rejected.total_count
-    if len(taken) + rejected != len(given) or Counter(taken) - Counter(given):
-        yield f"{reader.topic} at {reader.node.name}: {len(taken)} samples taken of {len(given)} received"
+    missing = len(given) - taken.total() - reader.local.rejected.total_count
+    may_expire = sum(change.expiry < math.inf for change in given)
+    surplus = taken - Counter((bytes(change.writer_guid), change.sequence_number) for change in given)
+    if surplus or not 0 <= missing <= may_expire:
+        yield f"{reader.topic} at {reader.node.name}: {taken.total()} samples taken of {len(given)} received"
 
 
 def complete(domain: Domain) -> list[str]:

@@ -111,6 +111,7 @@ class OfferedDeadlineMissed:
 
     total_count: int = 0
     total_count_change: int = 0
+    last_instance_handle: bytes = b""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +120,7 @@ class RequestedDeadlineMissed:
 
     total_count: int = 0
     total_count_change: int = 0
+    last_instance_handle: bytes = b""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,7 @@
 """``python -m multiproc_tests.omg``: the suite's cases, ours with ours and with the other, both ways round.
 
-Without a choice everything is played and ``docs/interop/omg.md`` is written.  The exit status is the number of
-unexpected failures, at most 100.
+Without a choice everything is played and ``docs/interop/omg.md`` is written.  What failed is played once more at the
+end, by itself.  The exit status is the number of unexpected failures, at most 100.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main(words: Sequence[str] | None = None) -> int:
     is_whole = not (arguments.case or arguments.pair or arguments.quick)
     if arguments.output is not None or is_whole:
         write_report(outcomes, arguments.output or RESULTS)
-    failures = [outcome for outcome in outcomes if outcome.verdict is Verdict.FAILED]
+    failures = [outcome for outcome in outcomes if _failed(outcome)]
     for outcome in failures:
         print(f"\n{outcome.case}, {outcome.publisher} to {outcome.subscriber}: {outcome.reason}\n{outcome.transcript}")
     counts = {verdict: sum(outcome.verdict is verdict for outcome in outcomes) for verdict in Verdict}
@@ -67,7 +67,7 @@ async def _run_all(
 ) -> list[Outcome]:
     plays = [(case, *pair) for case in cases for pair in pairs]
     outcomes: dict[int, Outcome] = {}
-    waiting = iter(enumerate(plays))
+    waiting = iter(list(enumerate(plays)))
     effort = QUICK if arguments.quick else FULL
 
     async def play_what_waits() -> None:
@@ -79,7 +79,14 @@ async def _run_all(
     async with trio.open_nursery() as nursery:
         for _ in range(arguments.jobs):
             nursery.start_soon(play_what_waits)
+    # Once more, one at a time: a case that counts milliseconds fails when the machine has too much else to do.
+    waiting = iter([(number, plays[number]) for number, outcome in sorted(outcomes.items()) if _failed(outcome)])
+    await play_what_waits()
     return [outcome for _, outcome in sorted(outcomes.items())]
+
+
+def _failed(outcome: Outcome) -> bool:
+    return outcome.verdict is Verdict.FAILED
 
 
 if __name__ == "__main__":

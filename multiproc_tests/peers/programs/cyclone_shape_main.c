@@ -168,6 +168,9 @@ static dds_qos_t *group_qos(void)
 
 /* --- statuses, each a line ------------------------------------------------------------------------ */
 
+/* Cyclone calls another partition an incompatible policy; to the specification it is nobody's mistake (DDS 1.4
+ * 2.2.3.13), and the suite waits in vain for a match.  */
+
 static const char *topic_of(dds_entity_t endpoint)
 {
   for (int i = 0; i < o.topics; i++)
@@ -179,15 +182,17 @@ static const char *topic_of(dds_entity_t endpoint)
 static void offered_incompatible(dds_entity_t writer, const dds_offered_incompatible_qos_status_t status, void *arg)
 {
   (void) arg;
-  printf("on_offered_incompatible_qos() topic: '%s'  type: 'ShapeType' : %u (%u)\n", topic_of(writer),
-         status.last_policy_id, status.last_policy_id);
+  if (status.last_policy_id != DDS_PARTITION_QOS_POLICY_ID)
+    printf("on_offered_incompatible_qos() topic: '%s'  type: 'ShapeType' : %u (%u)\n", topic_of(writer),
+           status.last_policy_id, status.last_policy_id);
 }
 
 static void requested_incompatible(dds_entity_t reader, const dds_requested_incompatible_qos_status_t status, void *arg)
 {
   (void) arg;
-  printf("on_requested_incompatible_qos() topic: '%s'  type: 'ShapeType' : %u (%u)\n", topic_of(reader),
-         status.last_policy_id, status.last_policy_id);
+  if (status.last_policy_id != DDS_PARTITION_QOS_POLICY_ID)
+    printf("on_requested_incompatible_qos() topic: '%s'  type: 'ShapeType' : %u (%u)\n", topic_of(reader),
+           status.last_policy_id, status.last_policy_id);
 }
 
 static void publication_matched(dds_entity_t writer, const dds_publication_matched_status_t status, void *arg)

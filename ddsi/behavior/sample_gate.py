@@ -1,0 +1,157 @@
+"""SampleGate: which samples a reader's policies let in, how long they stay, and which do not come in time.
+
+DDS 1.4 §2.2.3.9 (OWNERSHIP), §2.2.3.12 (TIME_BASED_FILTER), §2.2.3.16 (LIFESPAN), §2.2.3.7 (DEADLINE).  It stands
+before a :class:`.reader_history_cache.ReaderHistoryCache` and only says; the cache does.  What is turned away has been
+received all the same, as far as RTPS is concerned.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Iterable
+
+from ..structure.cache_change import CacheChange
+from ..structure.qos import EndpointQos
+from ..structure.qos_policies import Exclusive
+from ..structure.sample_info import InstanceState, SampleInfo
+from ..structure.time import TICKS_PER_SECOND
+from .deadline_watch import DeadlineWatch
+from .instance import Instance
+from .owners import Owners
+
+__all__ = ["SampleGate"]
+
+
+class SampleGate:
+    """``is_open``: nothing is turned away or expires, so nothing need be asked.
+
+    ``on_timer`` is called when :meth:`expired` and :meth:`missed` are to be asked earlier than was said before.
+    """
+
+    __slots__ = (
+        "_deadline",
+        "_expiries",
+        "_expiry_count",
+        "_lifespans",
+        "_on_timer",
+        "_owners",
+        "_separation",
+        "_timer_due",
+        "_wall_time",
+        "is_open",
+    )
+
+    def __init__(
+        self, qos: EndpointQos, *, wall_time: Callable[[float], float], on_timer: Callable[[float], None]
+    ) -> None:
+        """``wall_time(now)``: seconds since 1970."""
+        self._owners = Owners() if isinstance(qos.ownership, Exclusive) else None
+        self._separation = qos.time_based_filter.minimum_separation
+        self._deadline = DeadlineWatch(qos.deadline.period) if qos.deadline.period < math.inf else None
+        self._wall_time = wall_time
+        self._on_timer = on_timer
+        # Of the matched writers whose samples expire; and these samples by when, with a number that orders equal ones.
+        self._lifespans: dict[bytes, float] = {}
+        self._expiries: list[tuple[float, int, SampleInfo]] = []
+        self._expiry_count = 0
+        self._timer_due = math.inf
+        self.is_open = self._owners is None and self._separation == 0 and self._deadline is None
+
+    # --- the writers -------------------------------------------------------------------------------------
+
+    def writer_matched(self, writer: bytes, qos: EndpointQos) -> None:
+        """A writer was matched, or has other policies now: its strength, and how long its samples live."""
+        if self._owners is not None:
+            self._owners.writer_matched(writer, qos.ownership_strength.value)
+        if qos.lifespan.duration < math.inf:
+            self._lifespans[writer] = qos.lifespan.duration
+            self.is_open = False
+        else:
+            self._lifespans.pop(writer, None)
+
+    def writer_unmatched(self, writer: bytes) -> None:
+        self._lifespans.pop(writer, None)
+        if self._owners is not None:
+            self._owners.writer_lost(writer)
+
+    def may_write(self, writer: bytes, instance: Instance) -> bool:
+        """Does it own the instance, or would it take it over?"""
+        return self._owners is None or self._owners.may_write(writer, instance.owner)
+
+    # --- samples -----------------------------------------------------------------------------------------
+
+    def admits(self, instance: Instance, change: CacheChange, now: float) -> bool:
+        """Is the sample from the instance's owner, not expired, and due after the one before it?
+
+        A sample that has to wait for room is asked about again, so nothing is noted here that would answer otherwise
+        the second time.
+        """
+        lifespan = self._lifespans.get(change.writer_guid)
+        if lifespan is not None:
+            # By the writer's clock and ours, as the specification has it; a clock that goes ahead gains nothing by it.
+            age = self._wall_time(now) - change.source_timestamp / TICKS_PER_SECOND
+            change.expiry = now + min(lifespan - age, lifespan)
+            if change.expiry <= now:
+                return False
+        if self._owners is not None:
+            instance.writers.add(change.writer_guid)
+            if not self._owners.may_write(change.writer_guid, instance.owner):
+                return False
+            instance.owner = change.writer_guid
+        if self._deadline is not None:
+            self._deadline.heard(change.key, now)
+            self.arm()
+        # The first sample of a new life is no repetition.
+        is_due = now - instance.accepted_at >= self._separation
+        return is_due or instance.state is not InstanceState.ALIVE
+
+    def admitted(self, instance: Instance, info: SampleInfo, change: CacheChange, now: float) -> None:
+        """The sample is in the cache."""
+        instance.accepted_at = now
+        if change.writer_guid in self._lifespans:
+            self._expiry_count += 1
+            heapq.heappush(self._expiries, (change.expiry, self._expiry_count, info))
+            self.arm()
+
+    def ended(self, key: bytes) -> None:
+        """The instance is not alive any more: nothing is expected of it."""
+        if self._deadline is not None:
+            self._deadline.forget(key)
+
+    # --- the clock ---------------------------------------------------------------------------------------
+
+    def arm(self) -> None:
+        """See to it that somebody asks in time."""
+        due = self._expiries[0][0] if self._expiries else math.inf
+        if self._deadline is not None:
+            due = min(due, self._deadline.due)
+        if due < self._timer_due:
+            self._timer_due = due
+            self._on_timer(due)
+
+    def expired(self, now: float) -> list[SampleInfo]:
+        """The samples whose life is over, which may have been taken already.  Asked when the timer rings."""
+        self._timer_due = math.inf
+        found = []
+        while self._expiries and self._expiries[0][0] <= now:
+            found.append(heapq.heappop(self._expiries)[2])
+        return found
+
+    def missed(self, now: float) -> list[bytes]:
+        """The instances of which nothing came in time.  Asked when the timer rings."""
+        self._timer_due = math.inf
+        if self._deadline is None or self._deadline.due > now:
+            return []
+        return self._deadline.missed(now)
+
+    @property
+    def expiring(self) -> int:
+        """How many samples are kept in mind because they will expire."""
+        return len(self._expiries)
+
+    def forget_all_but(self, present: Iterable[SampleInfo]) -> None:
+        """Most samples are taken before they expire: their octets need not stay here as long as they could live."""
+        here = {id(info) for info in present}
+        self._expiries = [entry for entry in self._expiries if id(entry[2]) in here]
+        heapq.heapify(self._expiries)
