@@ -6,9 +6,9 @@ Values only; ``resolution.py`` gives them their meaning.  DDS-XTypes 1.3 §7.3.1
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from typing import Any
 
+from ..structure.dataclass import dataclass
 from ..structure.errors import BadParameter
 
 __all__ = [

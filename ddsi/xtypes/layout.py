@@ -8,8 +8,8 @@ fixed-size members the position is known, after a string only its residue may be
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from ..structure.dataclass import dataclass
 from ..structure.qos_policies import DataRepresentationId
 from .model import (
     ArrayType,

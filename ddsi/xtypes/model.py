@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
+
+from ..structure.dataclass import dataclass
 
 __all__ = [
     "BOOLEAN",

@@ -13,9 +13,10 @@ import sys
 import types
 import typing
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any
 
+from ..structure.dataclass import dataclass
 from ..structure.errors import BadParameter
 from . import model
 from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from ..structure.dataclass import dataclass
 from .layout import ALIGNED, UNKNOWN, Encoding, Residue
 from .source import Source
 

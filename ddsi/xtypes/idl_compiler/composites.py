@@ -171,9 +171,7 @@ class CompositeAnalysis:
             member = self._member(member_node, struct, next_id)
             _refuse_taken(member, taken, ids)
             if member.is_key and struct.base is not None and any(other.is_key for other in inherited):
-                raise IdlError(
-                    member.place, f"the key is that of the base {struct.base.scoped_name}; nothing adds to it"
-                )
+                raise IdlError(member.place, f"the base {struct.base.scoped_name} has the key; nothing adds to it")
             struct.members.append(member)
             next_id = member.id + 1
         struct.is_defined = True

@@ -167,6 +167,8 @@ class _Writer:
         self._module: tuple[str, ...] = ()
         self._typedefs: list[str] = []
         self._taken: dict[str, str] = {}
+        for module in sorted({_module(named)[:depth] for named in order for depth in range(1, len(_path(named)))}):
+            self._take("::".join(module), f"the module {'::'.join(module)}")
         for named in order:
             self._take("::".join(_path(named)), named.type_name)
             if isinstance(named, EnumType):  # IDL puts the literals beside their enum

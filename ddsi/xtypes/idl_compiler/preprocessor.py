@@ -22,9 +22,11 @@ __all__ = ["Preprocessor"]
 DEEPEST_INCLUDE = 32
 MOST_INCLUDES = 2_000
 DEEPEST_CONDITION = 256
-MOST_TOKENS = 1_000_000
-"""Tokens of all files together, and again of all macros together."""
-LONGEST_CALL = 2_000
+MOST_TOKENS = 500_000
+"""Of all files together: more than any real file has."""
+MOST_EXPANDED = 100_000
+"""Of all macros together."""
+LONGEST_CALL = 500
 DEEPEST_CALL = 50
 LARGEST_FILE = 1 << 24
 
@@ -250,14 +252,14 @@ class Preprocessor:
                 body = _substituted(token, macro, arguments)
             after = len(pending)
             placed = [
-                replace(part, place=token.place, comment="", starts_line=False)
-                for part in islice(body, MOST_TOKENS + 1 - self._expanded)
+                Token(part.kind, part.text, token.place, spaced=part.spaced)
+                for part in islice(body, MOST_EXPANDED + 1 - self._expanded)
             ]
             if placed:
-                placed[0] = replace(placed[0], comment=token.comment)
+                placed[0].comment = token.comment
             self._expanded += len(placed) + 1
-            if self._expanded > MOST_TOKENS:
-                raise IdlError(token.place, f"the macros expand to more than {MOST_TOKENS} tokens")
+            if self._expanded > MOST_EXPANDED:
+                raise IdlError(token.place, f"the macros expand to more than {MOST_EXPANDED} tokens")
             pending.extendleft(reversed(placed))
             hidden[token.text] = hidden.get(token.text, 0) + 1
             ends.append((after + 1, token.text))

@@ -47,7 +47,8 @@ def laid_out(expression: Expression, before: str, behind: str = "") -> str:
         return line
     indent = " " * (len(before) - len(before.lstrip()))
     if isinstance(expression, str):
-        fits = before.endswith(" = ") and len(indent) + _INDENT + len(expression) <= _WIDTH
+        longest = max(len(before) + 1, len(indent) + _INDENT + len(expression))
+        fits = before.endswith(" = ") and longest <= _WIDTH
         return f"{before}(\n{indent}{' ' * _INDENT}{expression}\n{indent})" if fits else line
     # A single part of a subscript takes no comma behind it: it would become a tuple.
     comma = "" if expression.brackets == "[]" and len(expression.parts) == 1 else ","

@@ -28,8 +28,10 @@ class TokenKind(Enum):
     END = "end of the text"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, slots=True)
 class Token:
+    """One token; not frozen, which would double the time of a large file."""
+
     kind: TokenKind
     text: str
     place: Place

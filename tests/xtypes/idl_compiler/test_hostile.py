@@ -1,0 +1,117 @@
+"""Text that wants too much is refused: no RecursionError, no exponential growth, no endless time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddsi import idl
+from ddsi.xtypes.idl_compiler.expressions import KEYWORDS
+
+DEEP = 1_000
+
+HOSTILE: dict[str, tuple[str, str]] = {
+    "parentheses": ("const long N = " + "(" * DEEP, "nests deeper than 64"),
+    "signs": ("const long N = " + "-" * DEEP + "1;", "nests deeper than 64"),
+    "operators inside": ("const long N = " + "1 | (1 ^ (1 & (1 << (1 + (1 * (" * DEEP, "nests deeper than 64"),
+    "sequences": ("struct A { " + "sequence<" * DEEP, "nests deeper than 64"),
+    "modules": ("module a { " * DEEP, "nests deeper than 64"),
+    "conditions": ("#if 1\n" * DEEP, "conditions nest deeper than 256"),
+    "condition's parentheses": ("#if " + "(" * DEEP, "the condition nests deeper"),
+    "condition's signs": ("#if " + "!" * DEEP, "the condition nests deeper"),
+    "condition's operators": ("#if " + "1 || (1 && (1 | (1 ^ (1 & (" * DEEP, "the condition nests deeper"),
+    "condition's choices": ("#if " + "1 ? 1 : " * DEEP + "1\n#endif", "the condition nests deeper"),
+    "condition's size": ("#if " + "4294967295 * 4294967295 * 4294967295\n#endif", "exceeds 64 bits"),
+    "growing macros": (
+        "#define A0 x x\n" + "".join(f"#define A{n + 1} A{n} A{n}\n" for n in range(60)) + "A60",
+        "the macros expand to more than 100000 tokens",
+    ),
+    "growing arguments": (
+        "#define F(x) x x\n" + "F(" * 40 + "1" + ")" * 40,
+        "the macros expand to more than 100000 tokens",
+    ),
+    "nested calls": (
+        "#define F(x) x\nconst long N = " + "F(" * 200 + "1" + ")" * 200 + ";",
+        "calls of macros nest deeper",
+    ),
+    "a call without end": (
+        "#define F(x) x\nF(\n" + "1\n" * 3_000,
+        "the arguments of a macro have more than 500 tokens",
+    ),
+    "a long number": ("const long N = " + "9" * 5_000 + ";", "is no number"),
+    "a large shift": ("const long N = 1 << 1000000000000;", "shifts by 0 to 63 bits"),
+    "many bases": (
+        "struct S0 { long m0; };\n" + "".join(f"struct S{n + 1} : S{n} {{ long m{n + 1}; }};\n" for n in range(200)),
+        "structs inherit through more than 100 others",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_text_is_refused(name: str) -> None:
+    text, reason = HOSTILE[name]
+    with pytest.raises(idl.IdlError, match=reason):
+        idl.loads(text)
+
+
+def test_a_file_that_includes_itself_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.idl").write_text('#include "a.idl"')
+    with pytest.raises(idl.IdlError, match="includes nest deeper than 32; does a file include itself"):
+        idl.load(tmp_path / "a.idl")
+
+
+def test_files_that_include_each_other_twice_are_refused(tmp_path: Path) -> None:
+    """Sixteen levels, each including the next twice, would be 65,536 files."""
+    for level in range(16):
+        (tmp_path / f"{level}.idl").write_text(f'#include "{level + 1}.idl"\n' * 2)
+    (tmp_path / "16.idl").write_text("")
+    with pytest.raises(idl.IdlError, match="there are more than 2000 includes"):
+        idl.load(tmp_path / "0.idl")
+
+
+def test_long_flat_text_is_fine() -> None:
+    """What is merely long goes through: sums, typedef chains, many types."""
+    assert idl.loads("const long N = " + "1 + " * 20_000 + "1;").N == 20_001
+    chain = "typedef long T0;\n" + "".join(f"typedef T{n} T{n + 1};\n" for n in range(2_000))
+    types = idl.loads(chain + "struct A { T2000 x; };")
+    assert "int32 x;" in idl.to_idl(types.A)
+    many = idl.loads("".join(f"enum E{n} {{ L{n} }};\n" for n in range(300)))
+    assert len(list(many)) == 300
+
+
+_WORDS = st.sampled_from(
+    [
+        *KEYWORDS,
+        *"<>{}()[];:,=@+-#",
+        "::",
+        "<<",
+        "key",
+        "id",
+        "A",
+        "B",
+        "x",
+        "1",
+        "2.5",
+        '"s"',
+        "'c'",
+        "\n",
+        "#if",
+        "#endif",
+    ]
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(_WORDS, max_size=60).map(" ".join) | st.text(max_size=60))
+def test_any_text_is_understood_or_refused(text: str) -> None:
+    try:
+        idl.loads(text)
+    except idl.IdlError as error:
+        refused = error
+    else:
+        return
+    assert refused.line >= 1
+    assert refused.column >= 1

@@ -1,0 +1,84 @@
+"""The preprocessor, by the constants that come through it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ddsi import idl
+
+CONSTANTS: dict[str, tuple[str, int]] = {
+    "object-like": ("#define A 3\nconst long N = A;", 3),
+    "in another": ("#define A B + 1\n#define B 3\nconst long N = A;", 4),
+    "of itself": ("const long A = 3;\n#define A (A + 1)\nconst long N = A;", 4),
+    "redefined": ("#define A 3\n#undef A\n#define A 4\nconst long N = A;", 4),
+    "with a parameter": ("#define TWICE(x) (2 * (x))\nconst long N = TWICE(3 + 1);", 8),
+    "with two": ("#define MAX(a, b) a + b\nconst long N = MAX((1, 2), 3);".replace("(1, 2)", "(1)"), 4),
+    "called in a call": ("#define F(x) (x + 1)\nconst long N = F(F(F(1)));", 4),
+    "without a call": ("const long F = 5;\n#define F(x) x\nconst long N = F;", 5),
+    "over lines": ("#define F(a, b) (a \\\n  - b)\nconst long N = F(\n  5,\n  2);", 3),
+    "without parameters": ("#define F() 7\nconst long N = F();", 7),
+    "ifdef": ("#define A\n#ifdef A\nconst long N = 1;\n#else\nconst long N = 2;\n#endif", 1),
+    "ifndef": ("#ifndef A\nconst long N = 1;\n#else\nconst long N = 2;\n#endif", 1),
+    "elif": ("#if 0\n#elif 1\nconst long N = 2;\n#elif 1\nconst long N = 3;\n#else\nconst long N = 4;\n#endif", 2),
+    "nested": ("#if 0\n#if 1\nconst long N = 1;\n#endif\n#else\nconst long N = 2;\n#endif", 2),
+    "not evaluated": ("#if 0\n#if 1 / 0 $$ \n#endif\n#endif\nconst long N = 1;".replace("$$", "+"), 1),
+    "defined": ("#define A\n#if defined(A) && !defined B\nconst long N = 1;\n#endif", 1),
+    "arithmetic": ("#if (1 << 4) / 3 == 5 && -7 / 2 == -3 && (5 >= 5 ? 1 : 0)\nconst long N = 1;\n#endif", 1),
+    "precedence": ("#if 1 + 2 * 3 == 7 && (1 | 6 ^ 2 & 3) == 5\nconst long N = 1;\n#endif", 1),
+    "names are zero": ("#if UNKNOWN == 0 && TRUE\nconst long N = 1;\n#endif", 1),
+    "other directives": ('#line 3 "x"\n#pragma pack(4)\n#ident "me"\n# 1 "a.idl"\n#\nconst long N = 1;', 1),
+    "comments": ("const /* not 2 */ long // = 3;\nN = /**/ 1;", 1),
+    "joined lines": ("const long N\\\n = 1;", 1),
+    "joined comment": ("// comment \\\n const long N = 2;\nconst long N = 1;", 1),
+    "carriage returns": ("#define A 1\r\nconst long N = A;\r\n", 1),
+}
+
+
+@pytest.mark.parametrize("name", CONSTANTS)
+def test_macros_and_conditions(name: str) -> None:
+    text, expected = CONSTANTS[name]
+    assert expected == idl.loads(text).N
+
+
+def test_definitions_may_be_given() -> None:
+    assert idl.loads("#if SIZE > 2\nconst long N = SIZE;\n#endif", defines={"SIZE": "1 + 2"}).N == 3
+
+
+def test_quoted_includes_look_beside_the_file_first(tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    (tmp_path / "a.idl").write_text("const long N = 1;")
+    (other / "a.idl").write_text("const long N = 2;")
+    (tmp_path / "quoted.idl").write_text('#include "a.idl"')
+    (tmp_path / "angled.idl").write_text("#include <a.idl>")
+    assert idl.load(tmp_path / "quoted.idl", include=[other]).N == 1
+    assert idl.load(tmp_path / "angled.idl", include=[other]).N == 2
+    assert idl.loads('#include "a.idl"', include=[other]).N == 2
+
+
+def test_includes_are_relative_to_the_file_that_includes(tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "a.idl").write_text('#include "b.idl"\n#include "../c.idl"')
+    (tmp_path / "inner" / "b.idl").write_text("const long B = 1;")
+    (tmp_path / "c.idl").write_text("const long C = 2;")
+    (tmp_path / "top.idl").write_text('#define FILE "inner/a.idl"\n#include FILE')
+    types = idl.load(str(tmp_path / "top.idl"))
+    assert (types.B, types.C) == (1, 2)
+
+
+@pytest.mark.parametrize("guard", ["#pragma once\n{}", "#ifndef A_IDL\n#define A_IDL\n{}\n#endif"])
+def test_a_guarded_file_may_be_included_twice(tmp_path: Path, guard: str) -> None:
+    (tmp_path / "a.idl").write_text(guard.format("struct A { long x; };"))
+    (tmp_path / "b.idl").write_text('#include "a.idl"\n#include "./a.idl"\n#include <a.idl>\n')
+    assert list(idl.load(tmp_path / "b.idl")) == ["A"]
+
+
+def test_warnings_are_told() -> None:
+    types = idl.loads('#warning old\nconst long N = 1;\n@mine struct A { @unit("m") @odd(3) long x; };')
+    assert [str(warning) for warning in types.idl_warnings] == [
+        "<text>:1:1: #warning old",
+        "<text>:3:1: @mine has no effect here, and is ignored",
+        "<text>:3:29: @odd has no effect here, and is ignored",
+    ]
