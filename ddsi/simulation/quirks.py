@@ -25,12 +25,12 @@ from ..messages.heartbeat import Heartbeat
 from ..messages.raw_submessage import LITTLE_ENDIAN, SubmessageKind, iterate_submessages
 from ..messages.submessages import Submessage
 from ..serialization.parameter_id import ParameterId
-from ..spi import HookEffect, SecurityHooks, SendMessage
+from ..spi import HookEffect, Plaintext, SecurityHooks, SendMessage
 from ..structure import builtin_entity_ids as ids
 from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.sequence_number import NumberSet
 from ..structure.vendor import FAST_DDS, RTI, RTI_MICRO, TWINOAKS
-from ..trace.generic_message import generic_message_outline
+from ..trace.generic_message import GenericMessageOutline, generic_message_outline
 
 if TYPE_CHECKING:
     from ..engine import Participant
@@ -46,6 +46,8 @@ __all__ = [
     "HeartbeatForAll",
     "KeysForEverybody",
     "LengthlessPostfix",
+    "NeedsParticipantToken",
+    "NeedsReaderToken",
     "NoParticipantTokens",
     "NonStandardPayload",
     "OpensAfterJoining",
@@ -105,6 +107,13 @@ class Quirk:
     def post(self, effect: HookEffect) -> HookEffect | None:
         """What security wants done: a handshake message, a token.  None leaves it undone."""
         return effect
+
+    def told(self, sender: bytes, message: GenericMessageOutline) -> None:
+        """A handshake message, or keys, of this participant."""
+
+    def withholds(self, local: Guid, remote: Guid) -> bool:
+        """Does this vendor not match the two yet, though security would let it?  Asked again after what it was told."""
+        return False
 
     def hear(self, sender: bytes, submessage: Submessage) -> bool:
         """Does this vendor understand a submessage, now that it is in clear?  ``sender``: the participant's prefix."""
@@ -295,6 +304,38 @@ class NoParticipantTokens(Quirk):
         is_token = outline is not None and outline.kind == "participant-tokens"
         sender = effect.change.writer_guid.participant
         return None if is_token and not self.hooks.overhead(sender, ()).message else effect
+
+
+class NeedsParticipantToken(Quirk):
+    """Nothing is matched with a participant before keys of it have come, be it one of kind NONE (§8.8.9)."""
+
+    def __init__(self, hooks: SecurityHooks) -> None:
+        super().__init__(hooks)
+        self._heard_from: set[bytes] = set()
+
+    def told(self, sender: bytes, message: GenericMessageOutline) -> None:
+        if message.kind in ("participant-tokens", "writer-tokens", "reader-tokens"):
+            self._heard_from.add(sender)
+
+    def withholds(self, local: Guid, remote: Guid) -> bool:
+        return remote[:12] not in self._heard_from and not isinstance(self.hooks, Plaintext)
+
+
+class NeedsReaderToken(Quirk):
+    """A writer that protects anything matches no reader before a key of it has come, be it one of kind NONE."""
+
+    def __init__(self, hooks: SecurityHooks) -> None:
+        super().__init__(hooks)
+        self._keyed: set[tuple[Guid, Guid]] = set()
+
+    def told(self, sender: bytes, message: GenericMessageOutline) -> None:
+        if message.kind == "reader-tokens":
+            self._keyed.add((message.destination_endpoint, message.source_endpoint))
+
+    def withholds(self, local: Guid, remote: Guid) -> bool:
+        added = self.hooks.overhead(local, (remote,))
+        is_protected = bool(added.payload or added.submessage)
+        return local.entity_id.is_writer and is_protected and (local, remote) not in self._keyed
 
 
 def _big_endian(octets: bytes, start: int, kinds: frozenset[SubmessageKind]) -> bytes:

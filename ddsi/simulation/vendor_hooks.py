@@ -23,9 +23,24 @@ from ..messages.submessages import (
     Submessage,
     decode_submessage,
 )
-from ..spi import HookEffect, Octets, Outcome, Parts, Rejected, SecurityHooks
+from ..spi import (
+    ADMITTED,
+    PENDING,
+    Admission,
+    Decided,
+    HookEffect,
+    Octets,
+    Outcome,
+    Parts,
+    Rejected,
+    SecurityHooks,
+)
+from ..structure import builtin_entity_ids as ids
+from ..structure.cache_change import CacheChange
+from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import MalformedMessage
-from ..structure.guid import Guid
+from ..structure.guid import EntityId, Guid
+from ..trace.generic_message import generic_message_outline
 from .quirks import Quirk
 
 if TYPE_CHECKING:
@@ -34,6 +49,13 @@ if TYPE_CHECKING:
 __all__ = ["VendorHooks"]
 
 _PREFIX = slice(8, HEADER_LENGTH)
+_TALKS_OF_SECURITY = frozenset(
+    {
+        EntityId.PARTICIPANT,
+        *(ids.PARTICIPANT_STATELESS_MESSAGE_WRITER, ids.PARTICIPANT_STATELESS_MESSAGE_READER),
+        *(ids.PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER, ids.PARTICIPANT_VOLATILE_MESSAGE_SECURE_READER),
+    }
+)
 _EntitySubmessage = AckNack | Data | DataFrag | Gap | Heartbeat | HeartbeatFrag | NackFrag
 
 
@@ -44,6 +66,7 @@ class VendorHooks:
         self.acts: Counter[type[Quirk]] = Counter()
         self._hooks = hooks
         self._quirks = [quirk(hooks) for quirk in quirks]
+        self._withheld: dict[tuple[Guid, Guid], None] = {}  # a dict serves as an ordered set
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._hooks, name)
@@ -57,12 +80,53 @@ class VendorHooks:
         self.acts[type(quirk)] += acts
         return acts
 
+    # --- matching ----------------------------------------------------------------------------------------
+
+    def match(self, local: Guid, remote: DiscoveredWriterData | DiscoveredReaderData) -> Admission:
+        admission = self._hooks.match(local, remote)
+        return PENDING if admission is ADMITTED and self._is_withheld(local, remote.guid) else admission
+
+    def unmatch(self, local: Guid, remote: Guid) -> None:
+        self._withheld.pop((local, remote), None)
+        self._hooks.unmatch(local, remote)
+
+    def remote_participant_lost(self, guid: Guid) -> None:
+        self._withheld = {pair: None for pair in self._withheld if pair[1].prefix != guid.prefix}
+        self._hooks.remote_participant_lost(guid)
+
+    def receive_message(self, change: CacheChange, now: float) -> None:
+        outline = generic_message_outline(change.payload)
+        if outline is not None:
+            for quirk in self._quirks:
+                quirk.told(change.writer_guid[:12], outline)
+        self._hooks.receive_message(change, now)
+
+    def _is_withheld(self, local: Guid, remote: Guid) -> bool:
+        """Security itself has to talk, whatever this vendor waits for."""
+        if local.entity_id in _TALKS_OF_SECURITY:
+            return False
+        is_withheld = any(self._acts(quirk, quirk.withholds(local, remote)) for quirk in self._quirks)
+        if is_withheld:
+            self._withheld[local, remote] = None
+        return is_withheld
+
     # --- outwards ----------------------------------------------------------------------------------------
 
     def drain_effects(self) -> Sequence[HookEffect]:
-        return [posted for effect in self._hooks.drain_effects() if (posted := self._post(effect)) is not None]
+        effects = [posted for effect in self._hooks.drain_effects() if (posted := self._post(effect)) is not None]
+        for pair in list(self._withheld):
+            if not any(quirk.withholds(*pair) for quirk in self._quirks):
+                del self._withheld[pair]
+                effects.append(Decided(*pair, ADMITTED))
+        return effects
 
     def _post(self, effect: HookEffect) -> HookEffect | None:
+        if (
+            isinstance(effect, Decided)
+            and effect.admission is ADMITTED
+            and self._is_withheld(effect.local, effect.remote)
+        ):
+            return None
         for quirk in self._quirks:
             posted = quirk.post(effect)
             self._acts(quirk, posted is not effect)

@@ -21,6 +21,8 @@ from .quirks import (
     HeartbeatForAll,
     KeysForEverybody,
     LengthlessPostfix,
+    NeedsParticipantToken,
+    NeedsReaderToken,
     NonStandardPayload,
     NoParticipantTokens,
     OpensAfterJoining,
@@ -56,10 +58,20 @@ class Vendor:
 
 
 CYCLONE_DDS = Vendor(
-    ids.CYCLONE, (AckNackCountZero, RefusesAckNackFromZero, HeartbeatForAll, GapWhenAsked, PlainTopicsInClear)
+    ids.CYCLONE,
+    (
+        AckNackCountZero,
+        RefusesAckNackFromZero,
+        HeartbeatForAll,
+        GapWhenAsked,
+        PlainTopicsInClear,
+        NeedsParticipantToken,
+    ),
 )
 DUST_DDS = Vendor(ids.DUST_DDS, (DropsCountZero,))
-FAST_DDS = Vendor(ids.FAST_DDS, (AckNackFromZero, DisposeByKeyHash, VendorSubmessageBehind, KeysForEverybody))
+FAST_DDS = Vendor(
+    ids.FAST_DDS, (AckNackFromZero, DisposeByKeyHash, VendorSubmessageBehind, KeysForEverybody, NeedsReaderToken)
+)
 OPENDDS = Vendor(
     ids.OPENDDS,
     (

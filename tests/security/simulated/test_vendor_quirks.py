@@ -100,6 +100,8 @@ def has_to_act(quirk: type[q.Quirk], governance: str) -> bool:
         return draft.data != "NONE"
     if quirk is q.NoParticipantTokens:
         return draft.rtps == "NONE"
+    if quirk in (q.NeedsParticipantToken, q.NeedsReaderToken):
+        return False  # what they wait for may be there already
     # Keys are for others only where there is a third participant; the last is of keyed topics.
     return quirk not in (q.HeartbeatForAll, q.GapWhenAsked, q.DisposeByKeyHash)
 
@@ -282,6 +284,25 @@ def test_who_has_no_keys_to_send_shows_by_its_answers_that_it_is_authenticated(
     assert opendds.played is not None
     assert opendds.played.acts[q.NoParticipantTokens] > 0
     assert kinds_sent(messages, ours)["final"] <= 2
+
+
+@pytest.mark.parametrize(
+    ("quirk", "governance"), [(q.NeedsParticipantToken, "nothing"), (q.NeedsReaderToken, "payload")]
+)
+def test_keys_of_no_kind_are_sent_to_those_who_wait_for_them(
+    quirk: type[q.Quirk], governance: str, identities: dict[str, list[Properties]]
+) -> None:
+    """Nothing is to be opened with them, but who does not get them waits for ever."""
+    waits = 0
+    for seed in range(4):
+        domain = Domain(seed, conditions=ROUGH)
+        ours = domain.node(properties=identities[governance][0])
+        other = domain.node(properties=identities[governance][1], vendor=Vendor(OUR_VENDOR_ID, (quirk,)))
+        both_ways(domain, ours, other)
+        rest(domain)
+        assert other.played is not None
+        waits += other.played.acts[quirk]
+    assert waits > 0
 
 
 class BareHandshake(q.Quirk):
