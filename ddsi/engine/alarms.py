@@ -46,9 +46,15 @@ class Alarms:
     def __init__(self, engine: Participant) -> None:
         self._engine = engine
         self._timers = Timers()
+        self._flush_at = math.inf  # not in the table: it is set and reset with nearly every sample
 
     def next_deadline(self) -> float:
-        return self._timers.next_deadline()
+        deadline = self._timers.next_deadline()
+        return deadline if deadline <= self._flush_at else self._flush_at
+
+    @property
+    def flush_is_set(self) -> bool:
+        return self._flush_at != math.inf
 
     def run_due(self, now: float) -> None:
         """Act on every timer that is due, earliest first.
@@ -57,10 +63,16 @@ class Alarms:
         (a mistake of ours) from stopping the program.
         """
         for _ in range(len(self._timers) + 10_000):
-            key = self._timers.pop_due(now)
+            key = self._pop_due(now)
             if key is None:
                 return
             self._fire(key, now)
+
+    def _pop_due(self, now: float) -> Hashable | None:
+        if self._flush_at <= now and self._flush_at < self._timers.next_deadline():
+            self._flush_at = math.inf
+            return Timer.FLUSH
+        return self._timers.pop_due(now)
 
     # --- setting -----------------------------------------------------------------------------------------
 
@@ -93,7 +105,7 @@ class Alarms:
         self._timers.set((Timer.REMOTE_LIVELINESS, guid), deadline)
 
     def flush(self, deadline: float) -> None:
-        self._timers.set(Timer.FLUSH, deadline)
+        self._flush_at = deadline
 
     def linger(self, writer: Guid, deadline: float) -> None:
         self._timers.set((Timer.LINGER, writer), deadline)

@@ -138,7 +138,6 @@ class Participant:
         self.recorder = Recorder(self, trace)
         self.alarms = Alarms(self)
         self._effects: list[Effect] = []
-        self._flush_armed = False
         self._hooks_deadline = math.inf
         self._next_entity_key = 1
         self._is_closed = False
@@ -178,7 +177,10 @@ class Participant:
         self.discovery.start(now)
 
     def receive_datagram(self, octets: Octets, source: Locator, now: float) -> None:
-        """One datagram from the network.  ``octets`` is only read during the call; what is kept is copied."""
+        """One datagram from the network; what is kept of ``octets`` is copied.
+
+        Where they can be written to, protected ones may be opened in place.
+        """
         if self._is_closed:
             return
         self.now = now
@@ -254,9 +256,7 @@ class Participant:
         """Send what is queued: several small samples may have been waiting for each other."""
         if not self.outbound.is_idle:
             self.outbound.flush()
-        if self._flush_armed:
-            self._flush_armed = False
-            self.alarms.flush(math.inf)
+        self.alarms.flush(math.inf)
 
     # --- endpoints ---------------------------------------------------------------------------------------
 
@@ -446,8 +446,7 @@ class Participant:
         due = behavior.next_deadline()
         if due != writer.timer_due:
             self.alarms.writer(writer, due)
-        if not self._flush_armed and not self.outbound.is_idle:
-            self._flush_armed = True
+        if not self.alarms.flush_is_set and not self.outbound.is_idle:
             self.alarms.flush(now + _FLUSH_AFTER_S)
         return change
 

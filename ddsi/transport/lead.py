@@ -80,3 +80,5 @@ class Lead:
             await trio.lowlevel.wait_readable(sock)
         finally:
             self.is_free = True
+            if self._deputy:  # of another socket, which is the one to wait for from now on
+                self._deputy.unpark_all()

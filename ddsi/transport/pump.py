@@ -189,23 +189,24 @@ class Pump:
 
     def _read(self, sock: socket.socket, history: ReaderHistoryCache | None) -> None:
         """Handle what is there, or so much of it that there is news in ``history``."""
-        now = trio.current_time()
         view, engine, locator_of = self._buffer, self.engine, self.transport.locator_of
-        for count in range(_BATCH):
+        now = -math.inf
+        for _ in range(_BATCH):
             try:
                 octets, address = sock.recvfrom_into(view)
             except BlockingIOError:
-                if not count:
-                    return
                 break
             except OSError:
                 if sock.fileno() < 0:  # closed since this task was woken
                     return
                 continue  # an ICMP error for something sent before; it is not about this socket
+            if now == -math.inf:
+                now = trio.current_time()
             engine.receive_datagram(view[:octets], locator_of(address), now)
             if history is not None and history.has_news:
                 break
-        self.settle()
+        if now != -math.inf:
+            self.settle()
 
     @property
     def can_be_led(self) -> bool:
