@@ -25,7 +25,7 @@ from .peers.keystore import PeerKeystore
 from .peers.options import Options
 from .peers.peer import Peer
 
-LIFE = timedelta(seconds=20)
+LIFE = timedelta(seconds=25)
 """Of what ends: on a busy machine, programs need some seconds until they have met."""
 PATIENCE = 40.0
 CONTINUAL = Options(governance="encrypt-all.p7s", count=1000, interval_ms=200, wait_s=90)
@@ -67,7 +67,7 @@ async def test_what_ends_while_it_is_used_takes_its_owner_out(tmp_path_factory: 
     keystore = _keystore(tmp_path_factory.mktemp("expiring"))
     with ExitStack() as stack:
         hosts = [stack.enter_context(namespace()) for _ in (*PEERS_THAT_END, *OURS_THAT_END)]
-        async with scenario("rights that end", deadline=80) as stage:
+        async with scenario("rights that end", deadline=100) as stage:
             failures: list[AssertionError] = []
 
             async def play(story: Callable[[Cast, str], Awaitable[None]], ending: Ending, host: Namespace) -> None:

@@ -48,7 +48,7 @@ async def test_nothing_of_an_intruder_is_accepted(publisher: Peer, subscriber: P
     )
     written, read = (replace(options, identity=name) for name in ("alice", "bob"))
     with namespace() as host:
-        async with scenario(f"intruder-{governance}-{publisher}-{subscriber}", deadline=100) as stage:
+        async with scenario(f"intruder-{governance}-{publisher}-{subscriber}", deadline=150) as stage:
             intruder = await _start_intruder(stage, host, options.topic)
             cast = Cast(stage, host, host, publisher, subscriber, written, read)
             reader, writer = await cast.start_subscriber(), await cast.start_publisher()
@@ -57,7 +57,7 @@ async def test_nothing_of_an_intruder_is_accepted(publisher: Peer, subscriber: P
             before = [_resident_kib(victim) for victim in victims]
             for order in ORDERS:
                 await intruder.send(order)
-                await intruder.expect(f"DONE {order} .*", timeout=60)
+                await intruder.expect(f"DONE {order} .*", timeout=90)
                 await _until_more_samples(reader)
             for victim, resident in zip(victims, before, strict=True):
                 assert _resident_kib(victim) - resident < MOST_GROWTH_KIB
