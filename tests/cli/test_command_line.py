@@ -40,7 +40,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     assert ended.value.code == 0
     shown = capsys.readouterr().out
-    for name in ("ls", "why", "shapes", "trace", "sim", "demo", "doctor"):
+    for name in ("ls", "why", "shapes", "trace", "sim", "idl", "demo", "doctor"):
         assert f"\n    {name} " in shown
 
 

@@ -20,7 +20,7 @@ from .python_names import python_identifier
 from .python_source import PythonSource
 from .source_text import IdlWarning, Place, SourceText
 
-__all__ = ["Namespace", "compile_idl", "load_file", "load_text"]
+__all__ = ["Namespace", "compile_file", "compile_idl", "load_file", "load_text"]
 
 
 class Namespace:
@@ -64,10 +64,15 @@ def compile_idl(
     )
 
 
+def compile_file(path: Path, **options: Any) -> Compilation:
+    """As :func:`compile_idl`, of a file.  Raises OSError too."""
+    return compile_idl(read_source(path), path, **options)
+
+
 def load_file(path: str | Path, **options: Any) -> Namespace:
     """See :func:`ddsi.idl.load`."""
     path = Path(path)
-    return _run(compile_idl(read_source(path), path, **options), path.name, python_identifier(path.stem))
+    return _run(compile_file(path, **options), path.name, python_identifier(path.stem))
 
 
 def load_text(text: str, **options: Any) -> Namespace:
