@@ -13,10 +13,10 @@ the source timestamp of the last sample delivered decides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 from ..structure.cache_change import CacheChange
+from ..structure.dataclass import dataclass
 from ..structure.guid import Guid
 
 __all__ = ["Position", "RepeatFilter"]

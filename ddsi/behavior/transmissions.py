@@ -6,10 +6,10 @@ they know nothing of datagrams, and tests read what they decided.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..structure.cache_change import CacheChange
+from ..structure.dataclass import dataclass
 from ..structure.sequence_number import NumberSet
 
 if TYPE_CHECKING:

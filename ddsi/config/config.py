@@ -9,11 +9,12 @@ from __future__ import annotations
 import ipaddress
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Literal, NoReturn, get_args
 
 from ddsi.structure.vendor import OUR_VENDOR_ID, VendorId
 
+from ..structure.dataclass import dataclass
 from .ports import HIGHEST_PORT, PortMapping
 from .refusal import RefusedSetting
 

@@ -6,10 +6,11 @@ really listens, it announces; a peer may have taken any port.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 from ddsi.structure.errors import ConfigurationError
 
+from ..structure.dataclass import dataclass
 from .refusal import RefusedSetting
 
 __all__ = ["HIGHEST_PORT", "PortMapping"]

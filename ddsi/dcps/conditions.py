@@ -6,9 +6,9 @@ DDS 1.4 §2.2.2.5.8 (ReadCondition), .9 (QueryCondition).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
+from ..structure.dataclass import dataclass
 from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE
 
 __all__ = ["ReadCondition"]

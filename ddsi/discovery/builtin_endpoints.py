@@ -6,11 +6,11 @@ matched with nobody.  Which of the secure ones a participant has, its hooks say.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
 from ..structure import builtin_entity_ids as ids
 from ..structure.builtin_entity_ids import BuiltinEndpoints
+from ..structure.dataclass import dataclass
 from ..structure.guid import EntityId
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import BestEffort, KeepAll, KeepLast, Reliable, TransientLocal, Volatile

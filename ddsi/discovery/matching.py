@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 
+from ..structure.dataclass import dataclass
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import DataRepresentation, DataRepresentationId

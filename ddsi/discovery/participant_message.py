@@ -5,10 +5,9 @@ When to send it, and what follows from its absence, is not here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..serialization.cursor import Octets, Reader, Writer
 from ..serialization.encapsulation import HEADER_LENGTH, Encapsulation, decode_encapsulation, encode_encapsulation
+from ..structure.dataclass import dataclass
 from ..structure.errors import MalformedMessage
 from ..structure.guid import GuidPrefix
 

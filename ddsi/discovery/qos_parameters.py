@@ -8,13 +8,14 @@ leaves out has that policy's default.  We announce each policy, defaults too: st
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 from ..serialization.cursor import Reader, Writer
 from ..serialization.parameter_id import ParameterId
 from ..structure import qos_policies as p
+from ..structure.dataclass import dataclass
 from ..structure.qos import EndpointQos
 from ..structure.vendor import OPENDDS, VendorId
 from .parameter_values import ParameterValues, ParameterWriter

@@ -15,7 +15,7 @@ that are gone and were not taken the newest 1024 are kept.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from ..behavior.reader_history_cache import ReaderHistoryCache
@@ -26,6 +26,7 @@ from ..structure.builtin_topic_data import (
     SubscriptionBuiltinTopicData,
 )
 from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.dataclass import dataclass
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import EntityKind, Guid
 from ..structure.qos import EndpointQos

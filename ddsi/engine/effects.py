@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from ..structure.dataclass import dataclass
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import Status

@@ -6,7 +6,7 @@ What was announced of it, its behavior, where its messages are packed, and its s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import StatefulReader
@@ -14,6 +14,7 @@ from ..behavior.stateful_writer import StatefulWriter
 from ..messages.packer import MessagePacker
 from ..spi import ProtectedEndpoint
 from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.dataclass import dataclass
 from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid
 from ..structure.status import (

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, TypeVar
@@ -45,6 +45,7 @@ from ..spi import (
 )
 from ..spi import Compute as HookCompute
 from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.dataclass import dataclass
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import NotAllowedBySecurity
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix

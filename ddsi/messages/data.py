@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntFlag
 
 from ..serialization.cursor import Octets, Reader
 from ..serialization.encapsulation import HEADER_LENGTH as ENCAPSULATION_LENGTH
 from ..serialization.parameter_list import ParameterList
+from ..structure.dataclass import dataclass
 from ..structure.guid import EntityId
 from .raw_submessage import LITTLE_ENDIAN, SubmessageKind
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntFlag
 
 from ..serialization.cursor import Octets, Reader
 from ..serialization.parameter_list import ParameterList
+from ..structure.dataclass import dataclass
 from ..structure.guid import EntityId
 from .data import encode_inline_qos, inline_qos_position
 from .raw_submessage import LITTLE_ENDIAN, SubmessageKind

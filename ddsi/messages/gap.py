@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntFlag
 
 from ..serialization.cursor import Octets, Reader, bitmap_words
+from ..structure.dataclass import dataclass
 from ..structure.guid import EntityId
 from ..structure.sequence_number import MAX_SET_BITS, NumberSet
 from .raw_submessage import LITTLE_ENDIAN, SubmessageKind

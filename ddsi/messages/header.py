@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..serialization.cursor import Octets
+from ..structure.dataclass import dataclass
 from ..structure.errors import MalformedMessage
 from ..structure.guid import GuidPrefix
 from ..structure.vendor import VendorId

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntFlag
 
 from ..serialization.cursor import Octets, Reader
+from ..structure.dataclass import dataclass
 from ..structure.guid import EntityId
 from .raw_submessage import LITTLE_ENDIAN, SubmessageKind
 

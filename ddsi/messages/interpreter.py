@@ -6,10 +6,10 @@ RTPS 2.5 §8.3.8.8 to §8.3.8.13, §9.4.5 ("interpreter submessages").  Their ef
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntFlag
 
 from ..serialization.cursor import Octets, Reader, Writer
+from ..structure.dataclass import dataclass
 from ..structure.guid import GuidPrefix
 from ..structure.locator import Locator, LocatorKind
 from ..structure.vendor import VendorId

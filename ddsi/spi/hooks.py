@@ -11,11 +11,12 @@ announced as a :class:`Compute` effect and comes back through :meth:`SecurityHoo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 from ..structure.builtin_entity_ids import BuiltinEndpoints
 from ..structure.cache_change import CacheChange
+from ..structure.dataclass import dataclass
 from ..structure.discovered import (
     DiscoveredParticipantData,
     DiscoveredReaderData,

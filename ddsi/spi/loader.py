@@ -7,13 +7,15 @@ group ``ddsi.security``.  DDS-Security 1.1 §9.3.1 (all its properties begin wit
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from importlib.metadata import EntryPoint, entry_points
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 from ..structure.errors import ConfigurationError
 from ..structure.qos_policies import Properties
 from .hooks import SecurityHooks
 from .plaintext import PLAINTEXT
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 __all__ = ["ENTRY_POINT_GROUP", "SECURITY_PROPERTY_PREFIX", "SPI_VERSION", "HooksFactory", "load_hooks"]
 
@@ -47,7 +49,7 @@ def load_hooks(
     """
     if not any(name.startswith(SECURITY_PROPERTY_PREFIX) for name in properties):
         return PLAINTEXT
-    found = list(entry_points(group=ENTRY_POINT_GROUP) if providers is None else providers)
+    found = list(_installed() if providers is None else providers)
     if not found:
         raise ConfigurationError(
             f"the participant has {SECURITY_PROPERTY_PREFIX}* properties, but no security provider is installed: "
@@ -57,6 +59,12 @@ def load_hooks(
         names = ", ".join(sorted(f"{entry.name} ({entry.value})" for entry in found))
         raise ConfigurationError(f"several security providers are installed, keep one of them: {names}")
     return _load_factory(found[0])(properties, entropy=entropy, wall_clock=wall_clock)
+
+
+def _installed() -> Iterable[EntryPoint]:
+    from importlib.metadata import entry_points  # takes as long to import as a tenth of all this; few need it
+
+    return entry_points(group=ENTRY_POINT_GROUP)
 
 
 def _load_factory(entry: EntryPoint) -> HooksFactory:

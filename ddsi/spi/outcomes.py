@@ -6,8 +6,9 @@ protected for somebody else is no error at all; so each case has a name and drop
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum, IntFlag
+
+from ..structure.dataclass import dataclass
 
 __all__ = [
     "ADMITTED",

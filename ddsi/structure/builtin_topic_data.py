@@ -6,9 +6,9 @@ who is there.  Where an entity lives, and what else SPDP and SEDP say for the pr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
+from .dataclass import dataclass
 from .discovered import ContentFilterProperty
 from .guid import Guid
 from .qos import EndpointQos

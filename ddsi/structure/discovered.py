@@ -6,9 +6,8 @@ Values only; ``discovery`` turns them into parameter lists and back.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .builtin_entity_ids import BuiltinEndpoints
+from .dataclass import dataclass
 from .guid import Guid
 from .locator import Locator
 from .qos import EndpointQos

@@ -6,10 +6,11 @@ DDS 1.4 §2.2.3.  A :class:`Qos` holds the policies that somebody set and None f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from types import MappingProxyType
 
 from . import qos_policies as p
+from .dataclass import dataclass
 from .errors import BadParameter, InconsistentPolicy
 
 __all__ = ["EndpointQos", "Qos", "reader_qos", "writer_qos"]

@@ -7,7 +7,7 @@ as they were announced.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from .dataclass import dataclass
 
 __all__ = ["EndpointSecurity", "ParticipantSecurity", "SecurityToken"]
 

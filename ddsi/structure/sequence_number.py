@@ -7,7 +7,8 @@ int32 and a uint32, here it is a plain int.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+
+from .dataclass import dataclass
 
 __all__ = [
     "MAX_SEQUENCE_NUMBER",

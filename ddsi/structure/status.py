@@ -6,8 +6,7 @@ before, so it serves as the value of the status too.  ``handle`` of a remote ent
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from .dataclass import dataclass
 from .guid import GUID_UNKNOWN, Guid
 
 __all__ = [

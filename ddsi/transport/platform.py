@@ -9,7 +9,8 @@ import ipaddress
 import socket
 import struct
 import sys
-from dataclasses import dataclass
+
+from ..structure.dataclass import dataclass
 
 __all__ = [
     "Interface",

@@ -16,7 +16,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from random import SystemRandom
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..config import Config
 from ..engine import Compute, Effect, Participant, ParticipantSetup, SendDatagram
 from ..spi import load_hooks
+from ..structure.dataclass import dataclass
 from ..structure.guid import GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos_policies import Properties

@@ -12,9 +12,9 @@ import ipaddress
 import socket
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 
 from ..config import Config
+from ..structure.dataclass import dataclass
 from ..structure.errors import ConfigurationError, OutOfResources
 from ..structure.locator import Locator, LocatorKind
 from .platform import (
