@@ -47,3 +47,13 @@ def test_what_only_others_manage_is_named(tmp_path: Path) -> None:
 
 def test_without_the_others_among_themselves_nothing_is_said_of_it(tmp_path: Path) -> None:
     assert "manage" not in secured_table(tmp_path, (DDSI, DDSI, Verdict.PASSED), (DDSI, CYCLONE, Verdict.PASSED))
+
+
+def test_a_reason_is_told_once_for_each_pair(tmp_path: Path) -> None:
+    outcomes = [
+        Outcome(case, FASTDDS, CYCLONE, Verdict.KNOWN, reason="it does not answer")
+        for case in ("none", "data", "metadata")
+    ]
+    write_report(outcomes, (OURS, CYCLONE_C, FAST_DDS), tmp_path)
+    limits = (tmp_path / "secured.md").read_text().partition("## Known limits of the others")[2]
+    assert limits.strip() == f"- {FASTDDS} to {CYCLONE}: it does not answer. In none, data, metadata"

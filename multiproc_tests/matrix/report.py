@@ -126,8 +126,12 @@ def _table(outcomes: Sequence[Outcome], pairs: Sequence[tuple[str, str]]) -> Ite
 
 
 def _reasons(heading: str, outcomes: Sequence[Outcome], verdict: Verdict) -> Iterable[str]:
-    chosen = [outcome for outcome in outcomes if outcome.verdict is verdict]
-    if chosen:
+    """Each reason once for each pair, with the cases that it holds for."""
+    cases: dict[tuple[str, str, str], list[str]] = {}
+    for outcome in outcomes:
+        if outcome.verdict is verdict:
+            cases.setdefault((outcome.publisher, outcome.subscriber, outcome.reason), []).append(outcome.case)
+    if cases:
         yield f"\n## {heading}\n"
-    for outcome in chosen:
-        yield f"- {outcome.case}, {outcome.publisher} to {outcome.subscriber}: {outcome.reason}"
+    for (publisher, subscriber, reason), names in cases.items():
+        yield f"- {publisher} to {subscriber}: {reason}. In {', '.join(names)}"
