@@ -3,11 +3,15 @@
 A task that waits for samples can as well wait for the socket itself: what arrives is then handled, and the task goes on
 with its sample at once, without another one having to be scheduled in between.  While it leads, the pump's task, its
 deputy, rests; when it leaves, and no other takes over before the scheduler comes round, the deputy reads again.
+
+A leader that got what it waited for goes on before the engine's effects are acted upon: it may well write at once, and
+then that is done together; else its deputy does it, or whoever waits first.
 """
 
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable
 from contextlib import suppress
 
 import trio
@@ -23,9 +27,11 @@ _ROUNDS_OF_GRACE = 3
 class Lead:
     """Of one socket.  ``is_free``: nobody waits for it now."""
 
-    __slots__ = ("_deputy", "_history", "_is_offered", "_waits_for", "is_disturbed", "is_free")
+    __slots__ = ("_deputy", "_history", "_is_offered", "_settle", "_waits_for", "is_disturbed", "is_free")
 
-    def __init__(self) -> None:
+    def __init__(self, settle: Callable[[], None]) -> None:
+        """``settle`` acts on what a leader has read and not acted upon."""
+        self._settle = settle
         self._deputy = trio.lowlevel.ParkingLot()
         self._history: ReaderHistoryCache | None = None
         self._waits_for: socket.socket | None = None
@@ -71,8 +77,10 @@ class Lead:
             self._is_offered = False
             for _ in range(_ROUNDS_OF_GRACE):
                 await trio.lowlevel.checkpoint()
+        self._settle()
         while not self.is_free:
             await self._deputy.park()
+            self._settle()
         if sock.fileno() < 0:  # closed meanwhile
             raise trio.ClosedResourceError
         self.is_free = False

@@ -102,7 +102,8 @@ class Pump:
         self._operations = 0
         self._last_yield = -math.inf
         self._buffer = memoryview(bytearray(65536))
-        self._lead = Lead()
+        self._lead = Lead(self._settle_late)
+        self._is_unsettled = False
 
     def _configured_trace(self, config: Config, now: float) -> TraceSink | None:
         if not config.trace_file and not config.pcap_file:
@@ -206,7 +207,11 @@ class Pump:
             engine.receive_datagram(view[:octets], locator_of(address), now)
             if history is not None and history.has_news:
                 break
-        if now != -math.inf:
+        if now == -math.inf:
+            return
+        if history is not None and history.has_news:
+            self._is_unsettled = True
+        else:
             self.settle()
 
     @property
@@ -297,9 +302,13 @@ class Pump:
         """Act on everything the engine has asked for, flush what it has queued, and re-arm the timer."""
         if self.is_closed:
             return
-        self._flush_wanted = False
+        self._flush_wanted = self._is_unsettled = False
         self._act_on(self.engine.drain_effects())
         self._rearm()
+
+    def _settle_late(self) -> None:
+        if self._is_unsettled:
+            self.settle()
 
     def written(self, now: float) -> None:
         """After a write at ``now``: a lone one leaves at once; one of a burst waits until the task yields.
@@ -332,7 +341,7 @@ class Pump:
     def before_waiting(self) -> None:
         """The calling task is about to wait: nothing of its own may lie in a queue meanwhile."""
         self._has_waited = True
-        if self._flush_wanted or self.engine.has_effects:
+        if self._flush_wanted or self._is_unsettled or self.engine.has_effects:
             self.settle()
 
     def _rearm(self) -> None:
