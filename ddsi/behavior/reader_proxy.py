@@ -13,7 +13,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredReaderData
 from ..structure.guid import GUID_UNKNOWN, EntityId, Guid
 from ..structure.locator import Locator
-from .schedules import NACK_RESPONSE_SUPPRESSION
+from .schedules import NACK_RESPONSE_SUPPRESSION, heartbeat_period
 
 __all__ = ["ReaderProxy"]
 
@@ -32,9 +32,11 @@ class ReaderProxy:
         "_last_preemptive",
         "_participant",
         "_resent",
+        "_unanswered",
         "acked_sn",
         "data",
         "guid",
+        "heartbeat_due",
         "history_sn",
         "is_reliable",
         "is_stalled",
@@ -66,6 +68,8 @@ class ReaderProxy:
         self._last_nack_frag_time = -math.inf
         self._last_preemptive = -math.inf
         self._resent: dict[int, float] = {}
+        self._unanswered = 0
+        self.heartbeat_due = -math.inf  # not to be asked again before
 
     def __repr__(self) -> str:
         return f"<ReaderProxy {self.guid} acked {self.acked_sn} sent {self.lst_seq}>"
@@ -102,6 +106,21 @@ class ReaderProxy:
             del self._resent[number]
         self.acked_sn = committed_sn
         return True
+
+    def asked(self, now: float) -> None:
+        """A periodic HEARTBEAT wants its answer: the more of them it leaves unanswered, the longer the next one waits.
+
+        Each reader for itself.  In a crowd somebody acknowledges all the time, and keeps the writer's own schedule at its
+        quickest; if each time all others were asked too, those who are behind would drown in questions.
+        """
+        self._unanswered += 1
+        self.heartbeat_due = now + heartbeat_period(self._unanswered)
+
+    def answered(self, now: float) -> None:
+        """An ACKNACK came, whatever it says."""
+        self.progress_time = now
+        self._unanswered = 0
+        self.heartbeat_due = -math.inf
 
     def accepts_acknack(self, count: int, now: float) -> bool:
         """Is this ACKNACK newer than the last?  Counts compare as serial numbers (RTPS 2.5 §8.3.8.1.3).

@@ -26,17 +26,21 @@ PREEMPTIVE_MAX = 5.0
 _MAX_TIMED = 512  # how many numbers under way are timed
 
 
+def heartbeat_period(unanswered: int) -> float:
+    """Seconds until the next HEARTBEAT when so many were left unanswered: doubled after every third."""
+    return min(HEARTBEAT_PERIOD_MIN * 2 ** min(unanswered // HEARTBEATS_BEFORE_BACKOFF, 16), HEARTBEAT_PERIOD_MAX)
+
+
 class HeartbeatSchedule:
     """Periodic heartbeats while somebody has not acknowledged: 50 ms, doubled after every third, 4 s at most.
 
     A write and every acknowledgment that makes progress start it over; it stops when all is acknowledged.
     """
 
-    __slots__ = ("_period", "_unanswered", "due")
+    __slots__ = ("_unanswered", "due")
 
     def __init__(self) -> None:
         self.due = math.inf
-        self._period = HEARTBEAT_PERIOD_MIN
         self._unanswered = 0
 
     def written(self, now: float) -> None:
@@ -54,17 +58,14 @@ class HeartbeatSchedule:
     def sent(self, now: float) -> None:
         """A periodic heartbeat was sent: the next one."""
         self._unanswered += 1
-        if self._unanswered % HEARTBEATS_BEFORE_BACKOFF == 0:
-            self._period = min(self._period * 2, HEARTBEAT_PERIOD_MAX)
-        self.due = now + self._period
+        self.due = now + heartbeat_period(self._unanswered)
 
     def stop(self) -> None:
         self.due = math.inf
 
     def _start(self, now: float) -> None:
-        self._period = HEARTBEAT_PERIOD_MIN
         self._unanswered = 0
-        self.due = now + self._period
+        self.due = now + HEARTBEAT_PERIOD_MIN
 
 
 class AckNackSchedule:

@@ -392,9 +392,14 @@ class StatefulWriter:
             lagging = self._lagging_readers()
             if self._mark_stalled(lagging, now):
                 out.extend(self.unsent_changes(now))
-            out.extend(self._heartbeats_for(lagging))
-            if lagging:
+            asked = [proxy for proxy in lagging if proxy.heartbeat_due <= now]
+            out.extend(self._heartbeats_for(asked))
+            for proxy in asked:
+                proxy.asked(now)
+            if asked:
                 self.heartbeat.sent(now)
+            elif lagging:
+                self.heartbeat.due = min(proxy.heartbeat_due for proxy in lagging)
             else:
                 self.heartbeat.stop()
         return out
@@ -442,7 +447,7 @@ class StatefulWriter:
             # Forged, or by a reader that was told lies.  The truth helps it; to believe it would end our heartbeats.
             self._on_dropped(DropReason.INVALID_SEQUENCE, proxy.guid, requested.base)
             return [self.directed_heartbeat(proxy)]
-        proxy.progress_time = now
+        proxy.answered(now)
         self._discount(proxy)
         was_stalled, proxy.is_stalled = proxy.is_stalled, False
         is_news = proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn))
@@ -499,7 +504,7 @@ class StatefulWriter:
         if not proxy.accepts_nack_frag(count, now):
             self._on_dropped(DropReason.STALE_COUNT, proxy.guid, count)
             return []
-        proxy.progress_time = now
+        proxy.answered(now)
         if sequence_number > min(self.next_unsent_sn, self.cache.last_sn):
             return []  # nothing of it was sent; a GAP would say that it never will be
         change = self.cache.get(sequence_number)

@@ -13,6 +13,7 @@ import pytest
 from ddsi.behavior.reader_proxy import ReaderProxy
 from ddsi.behavior.schedules import HEARTBEAT_PERIOD_MIN
 from ddsi.behavior.stateful_writer import StatefulWriter
+from ddsi.behavior.transmissions import SendHeartbeat
 from ddsi.structure.cache_change import ChangeKind
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 from ddsi.structure.qos import Qos
@@ -435,11 +436,44 @@ def test_heartbeats_go_to_who_lacks_something_and_stop_with_the_last() -> None:
     one, other = match(writer, 2), match(writer, 3)
     send(writer, b"")
     assert shape(writer.handle_timeout(HEARTBEAT_PERIOD_MIN)) == ["HB 1-1 ?"], "all lack it: to all"
-    acknack(writer, one, 2, count=1)
+    acknack(writer, one, 2, count=1, now=HEARTBEAT_PERIOD_MIN)
     now = writer.next_deadline()
     assert shape(writer.handle_timeout(now)) == ["HB 1-1 ? to 3"]
     acknack(writer, other, 2, count=1, now=now)
     assert writer.next_deadline() == math.inf
+
+
+def asked_of(writer: StatefulWriter, proxy: ReaderProxy, begin: float, end: float) -> int:
+    """How many HEARTBEATs that want an answer go to the reader meanwhile."""
+    count = 0
+    while (now := writer.next_deadline()) < end:
+        count += any(
+            isinstance(item, SendHeartbeat) and (item.readers is None or proxy in item.readers)
+            for item in writer.handle_timeout(max(now, begin))
+        )
+    return count
+
+
+def test_who_is_slow_is_not_asked_more_often_because_others_are_quick() -> None:
+    """In a crowd somebody acknowledges all the time; who is behind must not drown in questions."""
+    writer = stateful_writer()
+    quick, slow = match(writer, 2), match(writer, 3)
+    count = 0
+    for round_ in range(100):
+        now = 0.02 * round_
+        send(writer, b"", now=now)
+        acknack(writer, quick, round_ + 2, count=round_ + 1, now=now)
+        count += asked_of(writer, slow, now, now + 0.02)
+    assert 8 <= count <= 15  # in two seconds: 3 at 50 ms, 3 at 100 ms, ...
+
+
+def test_who_answers_is_asked_quickly_again() -> None:
+    writer = stateful_writer()
+    proxy = match(writer)
+    send(writer, b"")
+    asked_of(writer, proxy, 0.0, 60.0)
+    acknack(writer, proxy, 1, 1, count=1, now=60.0)
+    assert asked_of(writer, proxy, 60.0, 60.2) >= 3
 
 
 def test_the_piggybacked_heartbeat_asks_when_the_window_fills_up() -> None:
