@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.guid import GUID_UNKNOWN
 from ddsi.structure.sample_info import InstanceState, SampleInfo
 
-PAGE = (Path(__file__).parents[2] / "docs" / "shape_main.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "shape_main.md").read_text(encoding="utf-8")
 
 
 def _options(words: str) -> ShapeMainOptions:
@@ -141,7 +143,9 @@ def test_what_cannot_be_done_ends_with_the_words_that_the_suite_looks_for(
     assert not any("Create reader" in line or "Create writer" in line for line in lines)
 
 
-@pytest.mark.parametrize("words", ["-P -c RED -f 1 -s 1 --lifespan 1", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"])
+@pytest.mark.parametrize(
+    "words", ["-P -c RED -f 1 -s 1 --lifespan 1", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"]
+)
 def test_what_can_be_done_is_done(words: str) -> None:
     assert unsupported(_options(words)) is None
 
@@ -191,6 +195,15 @@ LINES: list[tuple[s.Status, str | None]] = [
 @pytest.mark.parametrize(("status", "line"), LINES)
 def test_a_status_is_the_line_that_the_suite_knows(status: s.Status, line: str | None) -> None:
     assert status_line("Square", "ShapeType", status) == line
+
+
+# --- how it is found -------------------------------------------------------------------------------------
+
+
+def test_it_is_installed_under_its_name() -> None:
+    """The suite starts one file; the installed script is that file."""
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    assert scripts["ddsi-shape-main"] == f"{main.__module__}:{main.__name__}"
 
 
 # --- its page --------------------------------------------------------------------------------------------
