@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from ddsi.spi import HookEffect, SendMessage
+from ddsi.spi import HookEffect, NotForUs, Outcome, Rejected, SendMessage
 from ddsi.structure.builtin_entity_ids import (
     PARTICIPANT_STATELESS_MESSAGE_WRITER,
     PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER,
@@ -27,13 +27,12 @@ __all__ = ["Mailbox"]
 
 
 class Mailbox:
-    """Of one participant.  ``effects`` takes what is to be written; ``refused`` counts what was not read, by reason."""
+    """Of one participant.  ``effects`` takes what is to be written."""
 
     def __init__(self, guid: Guid, effects: list[HookEffect]) -> None:
         self._guid = guid
         self._effects = effects
         self._numbers: Counter[EntityId] = Counter()
-        self.refused: Counter[str] = Counter()
 
     # --- out ---------------------------------------------------------------------------------------------
 
@@ -88,17 +87,15 @@ class Mailbox:
 
     # --- in ----------------------------------------------------------------------------------------------
 
-    def open(self, change: CacheChange) -> GenericMessage | None:
-        """The message, if it is for us and of whom it says; else None, counted where somebody is at fault."""
+    def open(self, change: CacheChange) -> GenericMessage | Outcome:
+        """The message, if it is for us and of whom it says; else why it is not read."""
         try:
             source, destination = peek_route(change.payload)
             if destination not in (self._guid, GUID_UNKNOWN):
-                return None  # Fast DDS shows everybody all keys, each under the key shared with him
+                return NotForUs()  # Fast DDS shows everybody all keys, each under the key shared with him
             # Only the prefix: the entity is another one with nearly every vendor.
             if source[:12] != change.writer_guid[:12]:
-                self.refused["the source is not the sender"] += 1
-                return None
+                return Rejected(f"a message of {source}, which is not its sender")
             return read_generic_message(change.payload)
-        except MalformedMessage:
-            self.refused["malformed"] += 1
-            return None
+        except MalformedMessage as error:
+            return Rejected(f"a message of security is malformed: {error}")

@@ -28,6 +28,7 @@ from ddsi.spi import (
     ProtectedEndpoint,
     Publish,
     Refused,
+    Rejected,
 )
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.cache_change import CacheChange
@@ -233,18 +234,18 @@ class SecurityService:
 
     # --- messages and the clock --------------------------------------------------------------------------
 
-    def receive_message(self, change: CacheChange, now: float) -> None:
+    def receive_message(self, change: CacheChange, now: float) -> Outcome | None:
         self._now = now
         remote = self._remotes.get(change.writer_guid.prefix)
         if remote is None:
-            return
+            return Rejected(f"a message of {change.writer_guid.participant}, which is not known")
         is_handshake = change.writer_guid.entity_id == ids.PARTICIPANT_STATELESS_MESSAGE_WRITER
         if is_handshake and len(change.payload) > MAX_HANDSHAKE_OCTETS:
             self._desk.too_large(remote, len(change.payload))
-            return
+            return Rejected(f"a handshake message of {len(change.payload)} octets")
         message = self._mailbox.open(change)
-        if message is None:
-            return
+        if isinstance(message, Outcome):
+            return message
         if is_handshake:
             self._desk.receive(remote, message, now)
         elif remote.standing is Standing.ADMITTED:
@@ -255,6 +256,7 @@ class SecurityService:
                 text = f"a key message of {remote.guid}: {refusal.reason}"
                 self._plugins.logging.log(LogLevel.WARNING_LEVEL, text, "key exchange", entity=remote.guid)
         self._rearm()
+        return None
 
     def computed(self, effect: Compute, result: object, now: float) -> None:
         self._now = now

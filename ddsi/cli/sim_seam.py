@@ -18,7 +18,7 @@ from ..messages.header import HEADER_LENGTH
 from ..messages.raw_submessage import iterate_submessages
 from ..messages.receiver import MessageReceiver
 from ..messages.submessages import Submessage, decode_submessage
-from ..spi import Admission, Compute, SecurityHooks
+from ..spi import Admission, Compute, Outcome, SecurityHooks
 from ..spi.hooks import Octets, Parts
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredParticipantData
@@ -79,11 +79,12 @@ class WatchedHooks:
         self._look()
         return admission
 
-    def receive_message(self, change: CacheChange, now: float) -> None:
+    def receive_message(self, change: CacheChange, now: float) -> Outcome | None:
         outline = generic_message_outline(change.payload)
         self.cause = "" if outline is None else outline.kind
-        self._hooks.receive_message(change, now)
+        outcome = self._hooks.receive_message(change, now)
         self._look()
+        return outcome
 
     def computed(self, effect: Compute, result: object, now: float) -> None:
         self._hooks.computed(effect, result, now)

@@ -14,7 +14,7 @@ from ..behavior.stateful_reader import StatefulReader
 from ..behavior.stateless_reader import StatelessReader
 from ..discovery.builtin_endpoints import BUILTIN_TOPICS, BuiltinTopic, Delivery, Stage
 from ..discovery.participant_proxy import ParticipantProxy
-from ..spi import ADMITTED, PENDING, Admission, Refused
+from ..spi import ADMITTED, PENDING, Admission, Outcome, Refused
 from ..structure import builtin_entity_ids as ids
 from ..structure.builtin_entity_ids import BuiltinEndpoints
 from ..structure.cache_change import CacheChange
@@ -94,8 +94,13 @@ class BuiltinTopics:
         waiting = list(self.waiting)
         self.waiting.clear()
         for reader_id, change in waiting:
-            take = self._takers.get(reader_id, self._engine.hooks.receive_message)
-            take(change, now)
+            take = self._takers.get(reader_id)
+            if take is not None:
+                take(change, now)
+                continue
+            outcome = self._engine.hooks.receive_message(change, now)
+            if isinstance(outcome, Outcome):
+                self._engine.inbound.undecodable(outcome, None)
 
     # --- matching ----------------------------------------------------------------------------------------
 

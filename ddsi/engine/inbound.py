@@ -152,7 +152,7 @@ class Inbound:
         if len(view) >= 24 and view[20] == SubmessageKind.SRTPS_PREFIX:
             decoded = self._hooks.decode_message(view, incoming.prefix)
             if isinstance(decoded, Outcome):
-                self._undecodable(incoming, decoded)
+                self.undecodable(decoded, incoming.source)
                 return
             view = memoryview(decoded)
             incoming.protection = _IN_MESSAGE
@@ -220,20 +220,21 @@ class Inbound:
             raise MalformedMessage("an envelope within an envelope", element="SEC_PREFIX")
         decoded = self._hooks.decode_submessage(octets, incoming.prefix)
         if isinstance(decoded, Outcome):
-            self._undecodable(incoming, decoded)
+            self.undecodable(decoded, incoming.source)
             return
         incoming.protection = outside | _IN_ENVELOPE
         self._submessages(incoming, memoryview(decoded), 0)
         incoming.protection = outside
 
-    def _undecodable(self, incoming: Incoming, outcome: Outcome) -> None:
+    def undecodable(self, outcome: Outcome, source: Locator | None) -> None:
+        """Security did not open something that came from there."""
         match outcome:
             case NotForUs():
-                self._engine.dropped(DropReason.NOT_FOR_US, incoming.source)
+                self._engine.dropped(DropReason.NOT_FOR_US, source)
             case NoKeys(key_id):
-                self._engine.dropped(DropReason.NO_KEYS, incoming.source, key_id.hex())
+                self._engine.dropped(DropReason.NO_KEYS, source, key_id.hex())
             case Rejected(reason):
-                self._engine.dropped(DropReason.REJECTED_BY_SECURITY, incoming.source, reason)
+                self._engine.dropped(DropReason.REJECTED_BY_SECURITY, source, reason)
 
     def _may_ask(self, incoming: Incoming, work: int) -> bool:
         """May this message make us do so much more?  What it asks for in vain it, or the next one, will ask again."""
@@ -293,7 +294,7 @@ class Inbound:
             return
         payload = self._hooks.decode_payload(remote.guid, view[payload_start:end])
         if isinstance(payload, Outcome):
-            self._undecodable(incoming, payload)
+            self.undecodable(payload, incoming.source)
             return
         timestamp = incoming.timestamp
         change = CacheChange(
@@ -329,7 +330,7 @@ class Inbound:
         if len(data.serialized_payload):
             payload = self._hooks.decode_payload(remote.guid, data.serialized_payload)
         if isinstance(payload, Outcome):
-            self._undecodable(incoming, payload)
+            self.undecodable(payload, incoming.source)
             return
         self._joined(incoming, remote, data.reader_id, data.writer_sn, bytes(payload), inline, is_key=data.is_key)
 
@@ -463,7 +464,7 @@ class Inbound:
         if not is_sealed:
             fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload)
         if isinstance(fragments, Outcome):
-            self._undecodable(incoming, fragments)
+            self.undecodable(fragments, incoming.source)
             return
         self._add_fragments(incoming, remote, data, memoryview(fragments), is_sealed=is_sealed)
 
@@ -514,7 +515,7 @@ class Inbound:
         if sample.is_sealed:
             payload = self._hooks.decode_payload(remote.guid, octets)
             if isinstance(payload, Outcome):
-                self._undecodable(incoming, payload)
+                self.undecodable(payload, incoming.source)
                 return
             octets = bytes(payload)
         timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp

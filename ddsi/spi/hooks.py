@@ -231,8 +231,11 @@ class SecurityHooks(Protocol):
 
     # --- messages and the clock --------------------------------------------------------------------------
 
-    def receive_message(self, change: CacheChange, now: float) -> None:
-        """A generic message arrived on the stateless or the volatile secure topic (§7.4.3, §7.4.4)."""
+    def receive_message(self, change: CacheChange, now: float) -> Outcome | None:
+        """A generic message arrived on the stateless or the volatile secure topic (§7.4.3, §7.4.4).
+
+        Where it is not read, the outcome says why, to be counted: Rejected, or NotForUs.
+        """
         ...
 
     def computed(self, effect: Compute, result: object, now: float) -> None: ...

@@ -10,12 +10,17 @@ from ddsi.messages.data_frag import DataFrag
 from ddsi.messages.gap import Gap
 from ddsi.messages.heartbeat import Heartbeat
 from ddsi.messages.interpreter import InfoDestination, InfoReply, Pad
+from ddsi.structure.builtin_entity_ids import (
+    PARTICIPANT_STATELESS_MESSAGE_READER,
+    PARTICIPANT_STATELESS_MESSAGE_WRITER,
+)
 from ddsi.structure.guid import EntityId, GuidPrefix
 from ddsi.structure.sequence_number import NumberSet
 from ddsi.trace.reasons import DropReason as Reason
 from ddsi.trace.sink import MemorySink
 from tests.engine.wire import Stranger
 from tests.engine.worst import OUR_WRITER, READER, WRITER, listener
+from tests.fuzz.session import Session
 
 ALL = EntityId.UNKNOWN
 NOBODY = EntityId(b"\0\0\x77\4")
@@ -91,3 +96,21 @@ def test_a_trace_says_whose_it_was() -> None:
         Stranger().endpoint(1, is_writer=True),
         "#1",
     )
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b"\0\1\0\0" + bytes(200), Reason.REJECTED_BY_SECURITY),  # of another source than its sender
+        (b"\0\1\0\0" + bytes(8), Reason.REJECTED_BY_SECURITY),  # malformed
+        (b"\0\1\0\0" + b"\x77" * 200, Reason.NOT_FOR_US),
+    ],
+)
+def test_a_message_of_security_that_is_not_read_is_counted(payload: bytes, reason: Reason) -> None:
+    session = Session.make()
+    engine = session.bob.engine
+    engine.drops.clear()
+    ids = (PARTICIPANT_STATELESS_MESSAGE_READER, PARTICIPANT_STATELESS_MESSAGE_WRITER)
+    octets = session.of_alice[0][:20] + Data(*ids, 99, None, payload).encode()
+    engine.receive_datagram(octets, session.alice.port.locator, engine.now)
+    assert engine.drops == {reason: 1}

@@ -30,19 +30,19 @@ def security_messages() -> Iterator[Made]:
     said = [payload for _, payload in said_to_bob()]
     first, keys = said[0], said[-1]
     handshake = sum(writer_id == STATELESS for writer_id, _ in said_to_bob())
-    yield "nothing", b"", DROPPED
+    yield "nothing", b"", "Rejected"
     yield "first", b"\0" + ON_STATELESS + first, "accepted"
     for name, payload in (("first", first), ("keys", keys)):
-        yield f"{name}-cut-off", b"\0" + ON_STATELESS + payload[: len(payload) // 2], DROPPED
+        yield f"{name}-cut-off", b"\0" + ON_STATELESS + payload[: len(payload) // 2], "Rejected"
         other_source = payload[:4] + bytes(12) + payload[16:]
-        yield f"{name}-of-another-source", b"\0" + ON_STATELESS + other_source, DROPPED
+        yield f"{name}-of-another-source", b"\0" + ON_STATELESS + other_source, "Rejected ~ not its sender"
     yield "keys-before-the-handshake", b"\0" + ON_VOLATILE + keys, IGNORED
     yield "keys-on-the-stateless-topic", bytes([handshake]) + ON_STATELESS + keys, IGNORED
     yield "handshake-on-the-volatile-topic", bytes([handshake]) + ON_VOLATILE + first, IGNORED
     yield "last-of-the-handshake-first", b"\0" + ON_STATELESS + said[handshake - 1], IGNORED
-    yield "nothing-but-zeros", b"\0" + ON_STATELESS + bytes(2000), DROPPED
+    yield "nothing-but-zeros", b"\0" + ON_STATELESS + bytes(2000), "Rejected"
     yield "too-large", b"\0" + ON_STATELESS + first + bytes(70_000), "Refused ~ more than"
-    yield "everything-4-billion", b"\0" + ON_STATELESS + first[:4] + b"\xff" * (len(first) - 4), IGNORED
+    yield "everything-4-billion", b"\0" + ON_STATELESS + first[:4] + b"\xff" * (len(first) - 4), "NotForUs"
 
 
 def conversations() -> Iterator[Made]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import cache
 from itertools import islice
 
-from ddsi.spi import ADMITTED, Refused
+from ddsi.spi import ADMITTED, Outcome, Refused
 from ddsi.structure.builtin_entity_ids import PARTICIPANT_STATELESS_MESSAGE_WRITER as STATELESS
 from ddsi.structure.builtin_entity_ids import PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER as VOLATILE
 from ddsi.structure.cache_change import CacheChange, ChangeKind
@@ -35,16 +35,15 @@ def security_message(octets: bytes) -> str:
         _match_if_admitted(alice, bob)
     bob.under_way.clear()
     state, decided = bob.hooks.handshake_state(alice.guid.prefix), bob.decided.copy()
-    refused = bob.hooks._mailbox.refused.total()
-    _hear(bob, alice, writer_id, octets[2:])
+    outcome = _hear(bob, alice, writer_id, octets[2:])
     assert bob.hooks.next_deadline() >= 0
-    if bob.hooks._mailbox.refused.total() > refused:
-        return "dropped: it is no message"
     refusals = [
         made for pair, made in bob.decided.items() if decided.get(pair) is not made and isinstance(made, Refused)
     ]
     if refusals:
         return verdict(lambda: refusals[0])
+    if outcome is not None:
+        return verdict(lambda: outcome)
     has_moved = bob.hooks.handshake_state(alice.guid.prefix) is not state or bob.decided != decided
     return ACCEPTED if has_moved or bob.under_way else "ignored: nothing has changed"
 
@@ -72,10 +71,11 @@ def _introduce(alice: Side, bob: Side) -> None:
         one.act()
 
 
-def _hear(receiver: Side, sender: Side, writer_id: EntityId, payload: bytes) -> None:
+def _hear(receiver: Side, sender: Side, writer_id: EntityId, payload: bytes) -> Outcome | None:
     change = CacheChange(ChangeKind.ALIVE, sender.endpoint(writer_id), 1, payload, destination=receiver.guid)
-    receiver.hooks.receive_message(change, 0.0)
+    outcome = receiver.hooks.receive_message(change, 0.0)
     receiver.act()
+    return outcome
 
 
 def _match_if_admitted(alice: Side, bob: Side) -> None:

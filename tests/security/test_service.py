@@ -7,7 +7,18 @@ from random import Random
 
 import pytest
 
-from ddsi.spi import ADMITTED, PENDING, PLAINTEXT, SPI_VERSION, NoKeys, Refused, Rejected, SendMessage, load_hooks
+from ddsi.spi import (
+    ADMITTED,
+    PENDING,
+    PLAINTEXT,
+    SPI_VERSION,
+    NoKeys,
+    NotForUs,
+    Refused,
+    Rejected,
+    SendMessage,
+    load_hooks,
+)
 from ddsi.spi import Protection as Level
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
@@ -302,9 +313,8 @@ def test_keys_for_others_are_passed_over_in_silence() -> None:
     alice.match(USER_WRITER, bob, USER_READER, "Square")
     alice.act()
     change = _as_from(alice, alice.under_way[0], destination_participant_guid=Guid(b"\x77" * 16))
-    bob.hooks.receive_message(change, 0.0)
+    assert isinstance(bob.hooks.receive_message(change, 0.0), NotForUs)
     bob.act()
-    assert not bob.hooks._mailbox.refused
 
 
 def test_nobody_brings_the_keys_of_another() -> None:
@@ -324,8 +334,9 @@ def test_a_message_whose_source_is_not_its_sender_is_not_read() -> None:
     alice.match(USER_WRITER, bob, USER_READER, "Square")
     alice.act()
     identity = MessageIdentity(Guid.of(Side("carol").guid.prefix, VOLATILE_WRITER), 1)
-    bob.hooks.receive_message(_as_from(alice, alice.under_way[0], message_identity=identity), 0.0)
-    assert bob.hooks._mailbox.refused["the source is not the sender"] == 1
+    outcome = bob.hooks.receive_message(_as_from(alice, alice.under_way[0], message_identity=identity), 0.0)
+    assert isinstance(outcome, Rejected)
+    assert "not its sender" in outcome.reason
 
 
 def test_early_keys_are_bounded() -> None:
