@@ -21,6 +21,7 @@ __all__ = [
     "HashId",
     "MemberId",
     "MemberName",
+    "TypedefName",
     "autoid_hash",
 ]
 
@@ -105,6 +106,17 @@ class MemberName:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise BadParameter(f"idl.name takes the member's name in IDL, not {self.name!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class TypedefName:
+    """``idl.typedef("module::Length")``: the IDL alias that the type before it has."""
+
+    name: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise BadParameter(f"idl.typedef takes the alias's name in IDL, not {self.name!r}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,8 +54,16 @@ def define_struct(
         raise BadParameter(f"{name}: typename is a name such as 'module::Name', not {type_name!r}")
     base = _base_of(python_class)
     decorated = _slotted(python_class)
-    search = _MemberSearch(decorated, base, hashed=autoid == "hash", frame=frame)
-    struct = StructType(decorated, type_name or name, extensibility, search.members, base=base, is_nested=is_nested)
+    hashed = autoid == "hash"
+    struct = StructType(
+        decorated,
+        type_name or name,
+        extensibility,
+        _MemberSearch(decorated, base, hashed=hashed, frame=frame).members,
+        base=base,
+        is_nested=is_nested,
+        has_hashed_ids=hashed,
+    )
     setattr(decorated, STRUCT_ATTRIBUTE, struct)
     with contextlib.suppress(NameError):  # a name not defined yet: found, or refused, at first use
         _ = struct.members
@@ -138,6 +146,7 @@ class _MemberSearch:
             idl_name=resolved.idl_name,
             is_external="external" in resolved.flags,
             is_serialized="non_serialized" not in resolved.flags,
+            typedefs=resolved.typedefs,
         )
         self._check(member, before)
         return member

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar, d
 
 from ..structure.errors import BadParameter
 from . import model
-from .annotations import Array, Bits, Bound, CaseLabels, ElementOf, Flag, HashId, MemberId, MemberName
+from .annotations import Array, Bits, Bound, CaseLabels, ElementOf, Flag, HashId, MemberId, MemberName, TypedefName
 from .bitsets import define_bitset
 from .definition import define_struct
 from .enumerations import describe_bitmask, describe_enum
@@ -76,6 +76,7 @@ __all__ = [
     "struct",
     "switch",
     "to_idl",
+    "typedef",
     "uint8",
     "uint16",
     "uint32",
@@ -162,6 +163,14 @@ def id(number: int) -> MemberId:
 def name(idl_name: str) -> MemberName:
     """The member's name in IDL, where Python keeps the word for itself: ``from_: Annotated[str, idl.name("from")]``."""
     return MemberName(idl_name)
+
+
+def typedef(idl_name: str) -> TypedefName:
+    """An IDL alias by name: ``Length: TypeAlias = Annotated[idl.float64, idl.typedef("module::Length")]``.
+
+    It changes neither value nor encoding.  Other programs are told of it, and hash it into the type's identity.
+    """
+    return TypedefName(idl_name)
 
 
 def bits(width: int, *, at: int | None = None) -> Bits:

@@ -3,7 +3,7 @@
 DDS-XTypes 1.3 §7.2.2 (the type system).  A topic type is a :class:`StructType` whose members have types built
 from primitives, strings, enums, bitmasks, bitsets, sequences, arrays, maps, unions and other structs.  Nodes are
 values, except structs and unions, which are identities: their members are found when they are first asked for, so
-that types may name themselves and each other.  Not here: aliases, which are transparent.
+that types may name themselves and each other.  Aliases are transparent: only a member remembers by which it was said.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ __all__ = [
     "SequenceType",
     "String",
     "StructType",
+    "Typedefs",
     "UnionType",
     "nested_structs",
     "reachable_structs",
@@ -236,6 +237,19 @@ class MapType:
 
 
 @dataclass(frozen=True, slots=True)
+class Typedefs:
+    """The aliases by which a member's type was said; a TypeObject tells of them, nothing else does.
+
+    ``names`` are those of the type itself, innermost first; ``parts`` those of its element, or its key and value.
+    ``rows``: how many dimensions an array had before those of its element, an aliased array, were joined to it.
+    """
+
+    names: tuple[str, ...] = ()
+    parts: tuple[Typedefs | None, ...] = ()
+    rows: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Member:
     """A member of a struct or union.  ``default`` makes the value that it has when a sample leaves it out.
 
@@ -252,6 +266,7 @@ class Member:
     idl_name: str = ""
     is_external: bool = False
     is_serialized: bool = True
+    typedefs: Typedefs | None = None
 
     @property
     def name_in_idl(self) -> str:
@@ -280,6 +295,7 @@ class StructType:
         "_resolve",
         "base",
         "extensibility",
+        "has_hashed_ids",
         "is_nested",
         "omitted",
         "python_class",
@@ -301,11 +317,13 @@ class StructType:
         base: StructType | None = None,
         omitted: tuple[Member, ...] = (),
         is_nested: bool = False,
+        has_hashed_ids: bool = False,
     ) -> None:
         self.python_class = python_class
         self.type_name = type_name
         self.extensibility = extensibility
         self.is_nested = is_nested
+        self.has_hashed_ids = has_hashed_ids
         self.base = base
         self.omitted = omitted
         self._resolve = resolve
@@ -346,7 +364,16 @@ class UnionType:
     In Python its object holds ``_idl_discriminator`` and ``_idl_value`` (see ``unions.py``).
     """
 
-    __slots__ = ("_found", "_resolve", "_selection", "extensibility", "is_nested", "python_class", "type_name")
+    __slots__ = (
+        "_found",
+        "_resolve",
+        "_selection",
+        "extensibility",
+        "has_hashed_ids",
+        "is_nested",
+        "python_class",
+        "type_name",
+    )
 
     def __init__(
         self,
@@ -356,11 +383,13 @@ class UnionType:
         resolve: Callable[[], tuple[Member, tuple[Case, ...]]],
         *,
         is_nested: bool = False,
+        has_hashed_ids: bool = False,
     ) -> None:
         self.python_class = python_class
         self.type_name = type_name
         self.extensibility = extensibility
         self.is_nested = is_nested
+        self.has_hashed_ids = has_hashed_ids
         self._resolve = resolve
         self._found: tuple[Member, tuple[Case, ...]] | None = None
         self._selection: dict[Any, int] | None = None

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 from ..structure.dataclass import dataclass
 from ..structure.errors import BadParameter
 from . import model
-from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName
+from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName, TypedefName
 from .enumerations import bitmask_type, enum_type
 from .model import (
     ArrayType,
@@ -32,6 +32,7 @@ from .model import (
     SequenceType,
     String,
     StructType,
+    Typedefs,
     UnionType,
 )
 
@@ -62,6 +63,7 @@ class Resolved:
     member_id: MemberId | HashId | None = None
     idl_name: str = ""
     bits: Bits | None = None
+    typedefs: Typedefs | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +83,15 @@ class Resolver:
             return self._optional(typing.get_args(annotation))
         if isinstance(annotation, str):
             raise BadParameter(f"{annotation!r} is no type")
-        return Resolved(self._plain(annotation, origin))
+        if origin in _SEQUENCES:
+            element = self._element(typing.get_args(annotation)[0], "sequence")
+            return Resolved(SequenceType(element.type), typedefs=_of_parts(element.typedefs))
+        if origin in _MAPS:
+            key, value = (self._element(part, "map") for part in typing.get_args(annotation))
+            return Resolved(
+                MapType(_checked_key(key.type), value.type), typedefs=_of_parts(key.typedefs, value.typedefs)
+            )
+        return Resolved(self._plain(annotation))
 
     def _evaluate(self, annotation: Any) -> Any:
         """Strings (PEP 563, quoted names), forward references (PEP 649) and ``type`` aliases (PEP 695)."""
@@ -115,8 +125,9 @@ class Resolver:
         elif isinstance(given[0], (Primitive, String)):
             resolved = Resolved(given[0])
         else:
-            element = self.resolve(given[0].annotation).type
-            resolved = Resolved(SequenceType(element, numpy=_is_numpy(self._evaluate(base), element)))
+            element = self.resolve(given[0].annotation)
+            type_ = SequenceType(element.type, numpy=_is_numpy(self._evaluate(base), element.type))
+            resolved = Resolved(type_, typedefs=_of_parts(element.typedefs))
         for marker in markers:
             self._mark(resolved, marker)
         return resolved
@@ -126,13 +137,16 @@ class Resolver:
             case Bound():
                 resolved.type = _bounded(resolved.type, marker.limit)
             case Array():
-                resolved.type = _array(resolved.type, marker.dimensions)
+                resolved.type, resolved.typedefs = _array(resolved, marker.dimensions)
             case Flag():
                 resolved.flags.add(marker.name)
             case MemberId() | HashId():
                 resolved.member_id = marker
             case MemberName(name=name):
                 resolved.idl_name = name
+            case TypedefName(name=name):
+                inner = resolved.typedefs or Typedefs()
+                resolved.typedefs = Typedefs((*inner.names, name), inner.parts, inner.rows)
             case Bits():
                 resolved.bits = marker
             case types.FunctionType() if marker.__module__.endswith(".xtypes.idl"):
@@ -150,12 +164,8 @@ class Resolver:
 
     # --- plain types -----------------------------------------------------------------------------------
 
-    def _plain(self, annotation: Any, origin: Any) -> IdlType:
-        if origin in _SEQUENCES:
-            return SequenceType(self._element(typing.get_args(annotation)[0], "sequence"))
-        if origin in _MAPS:
-            key, value = typing.get_args(annotation)
-            return MapType(_checked_key(self._element(key, "map")), self._element(value, "map"))
+    def _plain(self, annotation: Any) -> IdlType:
+        origin = typing.get_origin(annotation)
         if _is_ndarray(origin or annotation):
             return _numpy_sequence(annotation)
         if annotation is str:
@@ -170,12 +180,12 @@ class Resolver:
             return _class_type(annotation)
         raise BadParameter(_why_not(annotation, origin))
 
-    def _element(self, element: Any, collection: str) -> IdlType:
+    def _element(self, element: Any, collection: str) -> Resolved:
         resolved = self.resolve(element)
         unfit = resolved.flags | ({"id"} if resolved.member_id is not None else set())
         if unfit:
             raise BadParameter(f"idl.{min(unfit)} belongs to the member, not to the elements of its {collection}")
-        return resolved.type
+        return resolved
 
 
 def _checked_key(type_: IdlType) -> IdlType:
@@ -209,14 +219,25 @@ def _bounded(type_: IdlType, limit: int) -> IdlType:
             raise BadParameter(f"idl.bound fits strings, sequences and maps, not {type_}")
 
 
-def _array(type_: IdlType, dimensions: tuple[int, ...]) -> ArrayType:
+def _array(resolved: Resolved, dimensions: tuple[int, ...]) -> tuple[ArrayType, Typedefs | None]:
+    type_, typedefs = resolved.type, resolved.typedefs
     numpy = isinstance(type_, SequenceType) and type_.numpy
     for _ in dimensions:
         if isinstance(type_, SequenceType) and type_.bound is None:
-            type_ = type_.element
-    if isinstance(type_, ArrayType):
-        return ArrayType(type_.element, (*dimensions, *type_.dimensions), numpy or type_.numpy)
-    return ArrayType(type_, dimensions, numpy)
+            type_, typedefs = type_.element, typedefs.parts[0] if typedefs and typedefs.parts else None
+    if not isinstance(type_, ArrayType):
+        return ArrayType(type_, dimensions, numpy), _of_parts(typedefs)
+    joined = ArrayType(type_.element, (*dimensions, *type_.dimensions), numpy or type_.numpy)
+    if typedefs is not None and typedefs.names:
+        return joined, Typedefs(parts=(typedefs,), rows=len(dimensions))
+    if typedefs is not None and typedefs.rows:
+        return joined, Typedefs(parts=typedefs.parts, rows=len(dimensions) + typedefs.rows)
+    return joined, typedefs
+
+
+def _of_parts(*parts: Typedefs | None) -> Typedefs | None:
+    """Those of a collection, from those of its element, or key and value."""
+    return Typedefs(parts=parts) if any(parts) else None
 
 
 def _class_type(annotation: type[Any]) -> IdlType:
@@ -240,7 +261,7 @@ def _why_not(annotation: Any, origin: Any) -> str:
         return f"{shown} does not say of what; use idl.sequence[...]"
     if tuple in (annotation, origin):
         return "a tuple is no IDL type; use idl.sequence[...], with idl.array(n) for a fixed number of elements"
-    if isinstance(annotation, Flag | Bound | Array | MemberId | HashId | MemberName | Bits):
+    if isinstance(annotation, Flag | Bound | Array | MemberId | HashId | MemberName | TypedefName | Bits):
         return f"{annotation!r} stands inside Annotated[type, ...], behind a type"
     if isinstance(annotation, type) and issubclass(annotation, enum.Enum):
         return f"{shown} is an Enum; IDL enums are enum.IntEnum, bitmasks enum.IntFlag"

@@ -67,9 +67,12 @@ def define_union(
     if not isinstance(extensibility, Extensibility):
         raise BadParameter(f"{name}: extensibility is idl.FINAL, idl.APPENDABLE or idl.MUTABLE, not {extensibility!r}")
     labels = {key: value for key, value in python_class.__dict__.items() if isinstance(value, CaseLabels)}
-    search = _CaseSearch(python_class, labels, hashed=autoid == "hash", frame=frame)
+    hashed = autoid == "hash"
+    search = _CaseSearch(python_class, labels, hashed=hashed, frame=frame)
     decorated = _with_properties(python_class, search.switch, [key for key in labels if key != search.switch])
-    union = UnionType(decorated, type_name or name, extensibility, search.found, is_nested=is_nested)
+    union = UnionType(
+        decorated, type_name or name, extensibility, search.found, is_nested=is_nested, has_hashed_ids=hashed
+    )
     search.decorated = decorated
     setattr(decorated, STRUCT_ATTRIBUTE, union)
     with contextlib.suppress(NameError):  # a name not defined yet: found, or refused, at first use
@@ -119,6 +122,7 @@ class _CaseSearch:
             resolved.type,
             is_key="key" in resolved.flags,
             must_understand="must_understand" in resolved.flags,
+            typedefs=resolved.typedefs,
         )
         cases: list[Case] = []
         for name, labels in self._labels.items():
@@ -156,6 +160,7 @@ class _CaseSearch:
             must_understand="must_understand" in resolved.flags,
             idl_name=idl_name,
             is_external="external" in resolved.flags,
+            typedefs=resolved.typedefs,
             labels=tuple(self._label(name, switch.type, label) for label in labels.labels),
             is_default=labels.is_default,
         )

@@ -29,6 +29,7 @@ from .declarations import (
     StructDeclaration,
     TypeReference,
     UnionDeclaration,
+    unaliased,
 )
 from .python_layout import Expression, Group, call, docstring, laid_out, quoted, subscript
 from .python_names import literal_identifier, python_identifier, python_names
@@ -122,11 +123,16 @@ class PythonSource:
                 for _ in dimensions:
                     rows = subscript("idl.sequence", rows)
                 return _annotated(rows, call("idl.array", [str(dimension) for dimension in dimensions]))
-            case _:
+            case Alias() if _is_class(type_):  # the name is that of the class, which remains one
+                return _annotated(self.type(type_.type), _typedef(type_))
+            case Declaration():
                 return self.names[type_]
 
     def _alias(self, alias: Alias, name: str) -> list[str]:
-        type_ = self.type(alias.type)
+        if _is_class(alias):
+            type_ = self.type(unaliased(alias))
+        else:
+            type_ = _annotated(self.type(alias.type), _typedef(alias))
         if self._is_lazy(alias.type):  # in quotes, since it names what comes further down
             self._lazy.add(alias)
             return [laid_out(quoted(str(type_)), f"{name}: TypeAlias = ")]
@@ -147,9 +153,11 @@ class PythonSource:
 
     def _optional(self, type_: TypeReference) -> Expression:
         """``T | None``.  A name for quoted text cannot stand there, so what it says does."""
+        markers: list[Expression] = []
         while isinstance(type_, Alias) and type_ in self._lazy:
+            markers.insert(0, _typedef(type_))
             type_ = type_.type
-        found = self.type(type_)
+        found = _annotated(self.type(type_), *markers) if markers else self.type(type_)
         return (
             f"{found} | None" if isinstance(found, str) else Group(found.head, found.brackets, found.parts, " | None")
         )
@@ -301,6 +309,15 @@ def _annotated(type_: Expression, *markers: Expression) -> Group:
     if isinstance(type_, Group) and type_.head == "Annotated" and not type_.tail:
         return subscript("Annotated", *type_.parts, *markers)
     return subscript("Annotated", type_, *markers)
+
+
+def _is_class(alias: Alias) -> bool:
+    """Whether it is one of a struct, union, enum, bitmask or bitset, to be called or used like that itself."""
+    return isinstance(unaliased(alias), Declaration)
+
+
+def _typedef(alias: Alias) -> Expression:
+    return f"idl.typedef({quoted(alias.scoped_name)})"
 
 
 def _typename(declaration: Declaration, name: str) -> list[Expression]:
