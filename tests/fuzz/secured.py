@@ -96,24 +96,71 @@ def security_messages() -> Iterator[bytes]:
 # --- a whole engine -------------------------------------------------------------------------------------------------
 
 MOST_DATAGRAMS = 16
+MOST_USES = 100
+
+
+class Standing:
+    """A session whose last word is said.  It is used again as long as nothing has moved: to make one takes long."""
+
+    kept: Standing | None = None
+
+    def __init__(self) -> None:
+        self.session = Session.make()
+        self.ear = Ear(self.session.bob.engine)
+        self.uses = 0
+        (self.reader,) = self.session.bob.readers
+        self.written = [bytes(change.payload) for change in self.session.alice.writers[0].written.values()]
+        self.position = self.where()
+
+    @classmethod
+    def one(cls) -> Standing:
+        found, cls.kept = cls.kept or cls(), None
+        found.uses += 1
+        return found
+
+    def hear(self, octets: bytes) -> None:
+        self.ear.hear(octets, self.session.alice.port.locator)
+
+    def where(self) -> object:
+        """Everything that a datagram may have changed, but for timers."""
+        engine = self.ear.engine
+        return (
+            [(prefix, proxy.is_admitted, proxy.refusal) for prefix, proxy in engine.participants.items()],
+            [(guid, len(remote.defragmenter)) for guid, remote in engine.remote_writers.items()],
+            [
+                (proxy.guid, proxy.next_sn, proxy.last_seq, len(proxy.reorder), proxy.contradictions)
+                for reader in engine.local_readers.values()
+                for proxy in reader.behavior.writers.values()
+            ],
+            [
+                (proxy.guid, proxy.acked_sn, proxy.lst_seq)
+                for writer in engine.local_writers.values()
+                for proxy in writer.behavior.readers.values()
+            ],
+        )
+
+    def put_back(self) -> None:
+        if self.uses < MOST_USES and self.where() == self.position:
+            Standing.kept = self
 
 
 def secured_conversation(octets: bytes) -> str:
     """Datagrams, each up to the next "RTPS", to Bob's engine that has read all that Alice wrote; and what follows."""
-    session = Session.make()
-    (reader,) = session.bob.readers
-    written = [bytes(change.payload) for change in session.alice.writers[0].written.values()]
-    ear = Ear(session.bob.engine)
-    drops = ear.engine.drops.total()
+    bob = Standing.one()
+    bob.hear(recorded()[0])  # Alice lives
+    engine = bob.ear.engine
+    drops = engine.drops.total()
     for piece in octets.removeprefix(b"RTPS").split(b"RTPS", MOST_DATAGRAMS):
-        ear.hear(b"RTPS" + piece, session.alice.port.locator)
-    (peer,) = ear.engine.participants.values()
-    assert peer.is_admitted
-    ear.wait(3)
-    taken = [bytes(change.payload) for _, change in [*reader.taken, *reader.history.take()]]
-    assert [found[: len(true)] for found, true in zip(taken, written, strict=True)] == written, "nobody else can write"
-    assert len(ear.engine.participants) <= MOST_DATAGRAMS + 1
-    return "dropped" if ear.engine.drops.total() > drops else ACCEPTED
+        bob.hear(b"RTPS" + piece)
+    bob.ear.wait(1)
+    assert engine.participants[recorded()[0][8:20]].is_admitted
+    taken = [bytes(change.payload) for _, change in [*bob.reader.taken, *bob.reader.history.read()]]
+    true = zip(taken, bob.written, strict=True)
+    assert all(found.startswith(payload) for found, payload in true), "nobody else can write"
+    assert len(engine.participants) <= MOST_DATAGRAMS + 1
+    answer = "dropped" if engine.drops.total() > drops else ACCEPTED
+    bob.put_back()
+    return answer
 
 
 def secured_conversations() -> Iterator[bytes]:
@@ -125,5 +172,5 @@ def secured_conversations() -> Iterator[bytes]:
 
 SECURED_TARGETS = {
     "security_message": Target(security_message, security_messages, 4096, enormous=1 << 20),
-    "secured_conversation": Target(secured_conversation, secured_conversations, 4096, enormous=60_000, good="dropped"),
+    "secured_conversation": Target(secured_conversation, secured_conversations, 4096, enormous=60_000),
 }
