@@ -22,6 +22,7 @@ from ..messages.data_frag import DataFrag
 from ..messages.gap import Gap
 from ..messages.header import HEADER_LENGTH
 from ..messages.heartbeat import Heartbeat
+from ..messages.interpreter import InfoTimestamp
 from ..messages.raw_submessage import LITTLE_ENDIAN, SubmessageKind, iterate_submessages
 from ..messages.submessages import Submessage
 from ..serialization.parameter_id import ParameterId
@@ -52,6 +53,7 @@ __all__ = [
     "NonStandardPayload",
     "OpensAfterJoining",
     "PlainTopicsInClear",
+    "ProtectedTimestamp",
     "Quirk",
     "RefusesAckNackFromZero",
     "SealsBeforeCutting",
@@ -96,9 +98,13 @@ class Quirk:
         """Does a message to this endpoint leave without the protection of messages, where there is one?"""
         return False
 
-    def wrap(self, envelope: bytes) -> bytes:
+    def wrap(self, sender: Guid, receivers: Sequence[Guid], envelope: bytes) -> bytes:
         """What became of it: SEC_PREFIX to SEC_POSTFIX.  Only asked where submessages are protected."""
         return envelope
+
+    def assemble(self, message: bytes) -> bytes:
+        """A whole message with its header, before it is protected itself."""
+        return message
 
     def finish(self, message: bytes) -> bytes:
         """A whole message, protected or not, with its header."""
@@ -257,7 +263,7 @@ class NonStandardPayload(Quirk):
 class BigEndianEnvelopes(Quirk):
     """The headers of SEC_ and SRTPS_ submessages are big-endian, whatever is in them (RTPS 2.5 §9.4.5.1.2)."""
 
-    def wrap(self, envelope: bytes) -> bytes:
+    def wrap(self, sender: Guid, receivers: Sequence[Guid], envelope: bytes) -> bytes:
         return _big_endian(envelope, 0, _ENVELOPE)
 
     def finish(self, message: bytes) -> bytes:
@@ -274,6 +280,37 @@ class LengthlessPostfix(Quirk):
         if last.kind not in _POSTFIXES:
             return message
         return message[: last.offset + 2] + bytes(2) + message[last.offset + 4 :]
+
+
+class ProtectedTimestamp(Quirk):
+    """Where submessages are protected, the INFO_TS of a sample is one more, under the key of the writer."""
+
+    def __init__(self, hooks: SecurityHooks) -> None:
+        super().__init__(hooks)
+        self._ticks: int | None = None  # of the sample that is being protected
+
+    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+        self._ticks = None
+        if isinstance(submessage, Data | DataFrag):
+            change = self.engine.local_writers[sender].behavior.cache.get(submessage.writer_sn)
+            self._ticks = change.source_timestamp if change is not None else None
+        return submessage
+
+    def wrap(self, sender: Guid, receivers: Sequence[Guid], envelope: bytes) -> bytes:
+        if self._ticks is None:
+            return envelope
+        info = InfoTimestamp(self._ticks).encode()
+        return b"".join((*self.hooks.encode_submessage(sender, receivers, (info,)), envelope))
+
+    def assemble(self, message: bytes) -> bytes:
+        """Then there is none in clear."""
+        kept, is_inside, has_envelope = [message[:HEADER_LENGTH]], False, False
+        for raw in iterate_submessages(message):
+            is_inside = raw.kind == SubmessageKind.SEC_PREFIX or (is_inside and raw.kind != SubmessageKind.SEC_POSTFIX)
+            has_envelope = has_envelope or is_inside
+            if is_inside or raw.kind != SubmessageKind.INFO_TS:
+                kept.append(message[raw.offset : raw.end])
+        return b"".join(kept) if has_envelope else message
 
 
 class PlainTopicsInClear(Quirk):

@@ -144,7 +144,7 @@ class VendorHooks:
         encoded = b"".join(self._hooks.encode_submessage(sender, receivers, (said,))) if said else b""
         if encoded[:1] == bytes((SubmessageKind.SEC_PREFIX,)):
             for quirk in self._quirks:
-                wrapped = quirk.wrap(encoded)
+                wrapped = quirk.wrap(sender, receivers, encoded)
                 self._acts(quirk, wrapped is not encoded)
                 encoded = wrapped
         return (encoded,) if encoded else ()
@@ -164,8 +164,12 @@ class VendorHooks:
         return submessage.encode(little_endian=all(quirk.little_endian for quirk in self._quirks))
 
     def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        assembled = b"".join(message)
+        for quirk in self._quirks:
+            assembled = quirk.assemble(assembled)
         bare = [self._acts(quirk, quirk.bares(receivers[0])) for quirk in self._quirks if receivers]
-        encoded = b"".join(message if any(bare) else self._hooks.encode_message(receivers, message))
+        parts = (assembled,)
+        encoded = b"".join(parts if any(bare) else self._hooks.encode_message(receivers, parts))
         if not encoded:
             return ()
         for quirk in self._quirks:

@@ -27,6 +27,7 @@ from .quirks import (
     NoParticipantTokens,
     OpensAfterJoining,
     PlainTopicsInClear,
+    ProtectedTimestamp,
     Quirk,
     RefusesAckNackFromZero,
     SealsBeforeCutting,
@@ -70,7 +71,8 @@ CYCLONE_DDS = Vendor(
 )
 DUST_DDS = Vendor(ids.DUST_DDS, (DropsCountZero,))
 FAST_DDS = Vendor(
-    ids.FAST_DDS, (AckNackFromZero, DisposeByKeyHash, VendorSubmessageBehind, KeysForEverybody, NeedsReaderToken)
+    ids.FAST_DDS,
+    (AckNackFromZero, DisposeByKeyHash, VendorSubmessageBehind, KeysForEverybody, NeedsReaderToken, ProtectedTimestamp),
 )
 OPENDDS = Vendor(
     ids.OPENDDS,

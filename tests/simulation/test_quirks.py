@@ -139,9 +139,11 @@ SIGNED = _octets(
 
 def test_the_headers_of_an_envelope_turn_round_and_nothing_in_it() -> None:
     quirk = q.BigEndianEnvelopes(PLAINTEXT)
-    assert quirk.wrap(SIGNED) == _octets("3100 0004 01010101 0701 0400 02020202 3200 0004 03030303")
+    assert quirk.wrap(WRITER, (READER,), SIGNED) == _octets("3100 0004 01010101 0701 0400 02020202 3200 0004 03030303")
     body = _octets("3101 0400 01010101 3001 0800 0202020202020202 3201 0400 03030303")
-    assert quirk.wrap(body) == _octets("3100 0004 01010101 3000 0008 0202020202020202 3200 0004 03030303")
+    assert quirk.wrap(WRITER, (READER,), body) == _octets(
+        "3100 0004 01010101 3000 0008 0202020202020202 3200 0004 03030303"
+    )
 
 
 def test_an_envelope_in_a_signed_message_stays_as_it_was_signed() -> None:

@@ -102,6 +102,8 @@ def has_to_act(quirk: type[q.Quirk], governance: str) -> bool:
         return draft.rtps == "NONE"
     if quirk in (q.NeedsParticipantToken, q.NeedsReaderToken):
         return False  # what they wait for may be there already
+    if quirk is q.ProtectedTimestamp:
+        return True  # on the volatile topic, if nowhere else
     # Keys are for others only where there is a third participant; the last is of keyed topics.
     return quirk not in (q.HeartbeatForAll, q.GapWhenAsked, q.DisposeByKeyHash)
 
@@ -251,6 +253,18 @@ def test_what_opendds_sends_looks_like_it(identities: dict[str, list[Properties]
         assert not raw.little_endian
         is_open = raw.kind == SubmessageKind.SEC_POSTFIX and raw.end == len(octets)
         assert octets[raw.offset + 2 : raw.offset + 4] == (b"\0\0" if is_open else b"\0\x14")
+
+
+@pytest.mark.parametrize("governance", ["encrypt", "sign", "submessage"])
+def test_a_protected_time_stamp_is_that_of_the_sample(governance: str, identities: dict[str, list[Properties]]) -> None:
+    domain = Domain(1, conditions=ROUGH)
+    ours = domain.node(properties=identities[governance][0])
+    vendor = Vendor(FAST_DDS.vendor_id, (q.ProtectedTimestamp,))
+    other = domain.node(properties=identities[governance][1], vendor=vendor, clock_error=-3600.0)
+    pairs = both_ways(domain, ours, other)
+    for writer, reader in pairs:
+        received = [change.source_timestamp for change in reader.session(writer.guid).changes]
+        assert received == [change.source_timestamp for change in writer.written.values()]
 
 
 # --- keys and handshakes --------------------------------------------------------------------------------------------
