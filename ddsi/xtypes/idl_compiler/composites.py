@@ -31,6 +31,8 @@ from .declarations import (
     StructDeclaration,
     TypeReference,
     UnionDeclaration,
+    collections_inside,
+    levels_of,
     unaliased,
 )
 from .scopes import declare, look_up
@@ -69,7 +71,14 @@ _TYPES = (Alias, EnumDeclaration, BitmaskDeclaration, BitsetDeclaration, StructD
 _Composite = TypeVar("_Composite", StructDeclaration, UnionDeclaration)
 
 MOST_ELEMENTS = (1 << 32) - 1
+MOST_DIMENSIONS = 16
+DEEPEST_COLLECTION = 12
+"""Each is a loop in the generated code, and Python nests 20 of them."""
+DEEPEST_TYPE = 100
+"""Structs and unions inside one another."""
 MOST_BASES = 100
+MOST_INHERITED = 200_000
+"""Members that structs of one file inherit, or that keylists look through, all together."""
 
 
 class CompositeAnalysis:
@@ -83,6 +92,7 @@ class CompositeAnalysis:
         self.incomplete_uses: list[tuple[Place, StructDeclaration | UnionDeclaration]] = []
         self.is_hashed = False
         self.is_nested = False
+        self._inherited = 0
         self._default_extensibility = default_extensibility
 
     # --- names and types ---------------------------------------------------------------------------------
@@ -138,6 +148,8 @@ class CompositeAnalysis:
         return value
 
     def dimensions(self, expressions: Sequence[Expression]) -> tuple[int, ...]:
+        if len(expressions) > MOST_DIMENSIONS:
+            raise IdlError(expressions[MOST_DIMENSIONS].place, f"an array has {MOST_DIMENSIONS} dimensions at most")
         found: list[int] = []
         count = 1
         for expression in expressions:
@@ -162,8 +174,9 @@ class CompositeAnalysis:
         annotations = self._composite_annotations(node, struct)
         if node.base is not None:
             struct.base = self._base_struct(node.base)
+            struct.levels = struct.base.levels
         annotations.warn_of_the_rest()
-        inherited = struct.all_members()
+        inherited = self._all_members(struct, node.place)
         taken = {member.name.lower(): member for member in inherited}
         ids = {member.id: member for member in inherited}
         next_id = inherited[-1].id + 1 if inherited else 0
@@ -174,8 +187,26 @@ class CompositeAnalysis:
                 raise IdlError(member.place, f"the base {struct.base.scoped_name} has the key; nothing adds to it")
             struct.members.append(member)
             next_id = member.id + 1
+            struct.levels = self._checked_levels(struct, member)
         struct.is_defined = True
         self.declarations.append(struct)
+
+    def _all_members(self, struct: StructDeclaration, place: Place) -> list[MemberDeclaration]:
+        """Those of the bases first.  In a file that makes many of few by inheritance, the sum is bounded."""
+        found = struct.all_members()
+        self._inherited += len(found)
+        if self._inherited > MOST_INHERITED:
+            raise IdlError(place, f"all structs together inherit more than {MOST_INHERITED} members")
+        return found
+
+    def _checked_levels(self, composite: StructDeclaration | UnionDeclaration, member: MemberDeclaration) -> int:
+        """The levels of a composite with one more member."""
+        if collections_inside(member.type) > DEEPEST_COLLECTION:
+            raise IdlError(member.place, f"sequences, arrays and maps nest deeper than {DEEPEST_COLLECTION}")
+        levels = max(composite.levels, 1 + levels_of(member.type))
+        if levels > DEEPEST_TYPE:
+            raise IdlError(member.place, f"types nest deeper than {DEEPEST_TYPE}")
+        return levels
 
     def _opened(self, node: Definition, kind: type[_Composite]) -> _Composite:
         known = self.scope.members.get(node.name)
@@ -282,6 +313,7 @@ class CompositeAnalysis:
             member = self._case(case, union, bare, labels, next_id)
             _refuse_taken(member, taken, ids)
             union.members.append(member)
+            union.levels = self._checked_levels(union, member)
         if not union.members:
             raise IdlError(node.place, f"{node.name} has no case; a union has one at least")
         union.is_defined = True
@@ -339,7 +371,8 @@ class CompositeAnalysis:
             for step in path.split("."):
                 if not isinstance(owner, StructDeclaration):
                     raise IdlError(node.place, f"#pragma keylist: expected a struct; {name} with {path} is none")
-                member = next((member for member in owner.all_members() if member.name == step), None)
+                members = self._all_members(owner, node.place)
+                member = next((member for member in members if member.name == step), None)
                 if member is None:
                     raise IdlError(node.place, f"#pragma keylist: {owner.scoped_name} has no member {step}")
                 member.is_key = True

@@ -32,6 +32,8 @@ __all__ = [
     "StructDeclaration",
     "TypeReference",
     "UnionDeclaration",
+    "collections_inside",
+    "levels_of",
     "unaliased",
 ]
 
@@ -112,6 +114,14 @@ class Alias(Declaration):
     """A typedef."""
 
     type: TypeReference = field(kw_only=True)
+    collections: int = 0
+    """What :func:`collections_inside` finds; kept, so that a chain of typedefs is not walked again and again."""
+    levels: int = 0
+    """What :func:`levels_of` finds."""
+
+    def __post_init__(self) -> None:
+        self.collections = collections_inside(self.type)
+        self.levels = levels_of(self.type)
 
 
 @dataclass(eq=False, slots=True)
@@ -179,6 +189,8 @@ class _Composite(Declaration):
     is_hashed: bool = False
     is_nested: bool = False
     members: list[MemberDeclaration] = field(default_factory=list)
+    levels: int = 1
+    """How deep structs and unions nest in it, itself included."""
 
 
 @dataclass(eq=False, slots=True)
@@ -226,6 +238,32 @@ class Compilation:
     declarations: list[Declaration]
     """In the order of their definition: what a declaration needs comes before it, but for recursion."""
     warnings: list[IdlWarning]
+
+
+def collections_inside(type_: TypeReference) -> int:
+    """How deep sequences, arrays and maps nest, up to the structs that they hold."""
+    match type_:
+        case SequenceOf(element=element) | ArrayOf(element=element):
+            return 1 + collections_inside(element)
+        case MapOf(key=key, value=value):
+            return 1 + max(collections_inside(key), collections_inside(value))
+        case Alias(collections=collections):
+            return collections
+        case _:
+            return 0
+
+
+def levels_of(type_: TypeReference) -> int:
+    """How deep structs and unions nest in a type.  What is not complete yet, so that it recurs, counts as one."""
+    match type_:
+        case SequenceOf(element=element) | ArrayOf(element=element):
+            return levels_of(element)
+        case MapOf(key=key, value=value):
+            return max(levels_of(key), levels_of(value))
+        case Alias(levels=levels) | StructDeclaration(levels=levels) | UnionDeclaration(levels=levels):
+            return levels
+        case _:
+            return 0
 
 
 def unaliased(type_: TypeReference) -> TypeReference:

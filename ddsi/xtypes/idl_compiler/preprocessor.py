@@ -26,9 +26,11 @@ MOST_TOKENS = 500_000
 """Of all files together: more than any real file has."""
 MOST_EXPANDED = 100_000
 """Of all macros together."""
-LONGEST_CALL = 500
+LONGEST_CALL = 10_000
 DEEPEST_CALL = 50
-LARGEST_FILE = 1 << 24
+LARGEST_FILE = 1 << 22
+MOST_OCTETS = 1 << 24
+"""Of all files together, each as often as it is included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class _Condition:
 
     place: Place
     is_active: bool
+    """It holds, and so do all around it."""
     was_active: bool
     """Some branch was taken already."""
     in_else: bool = False
@@ -58,6 +61,7 @@ class Preprocessor:
         self._once: set[Path] = set()
         self._includes = 0
         self._tokens = 0
+        self._octets = 0
         self._expanded = 0
         self.warnings: list[IdlWarning] = []
 
@@ -71,16 +75,15 @@ class Preprocessor:
     def _file(self, source: SourceText, path: Path | None, *, depth: int) -> Iterator[Token]:
         conditions: list[_Condition] = []
         pending: deque[Token] = deque()
+        opened: int | None = None
         for line in self._lines(source):
             if line[0].text == "#" and line[0].starts_line:
                 yield from self._expand(pending)
                 yield from self._directive(line, conditions, path, depth)
-            elif all(condition.is_active for condition in conditions):
+            elif _is_active(conditions):
+                opened = self._opened(line, opened if pending else None)
                 pending.extend(line)
-                if not self._macros:
-                    yield from pending
-                    pending.clear()
-                elif not _is_inside_call(pending, self._macros):
+                if opened is None:
                     yield from self._expand(pending)
                 elif len(pending) > LONGEST_CALL:
                     raise IdlError(line[0].place, f"the arguments of a macro have more than {LONGEST_CALL} tokens")
@@ -109,7 +112,7 @@ class Preprocessor:
         if name in ("if", "ifdef", "ifndef", "elif", "else", "endif"):
             self._conditional(name, hash_.place, arguments, conditions)
             return
-        if not all(condition.is_active for condition in conditions):
+        if not _is_active(conditions):
             return
         match name:
             case "include":
@@ -138,8 +141,7 @@ class Preprocessor:
         if name in ("if", "ifdef", "ifndef"):
             if len(conditions) >= DEEPEST_CONDITION:
                 raise IdlError(place, f"conditions nest deeper than {DEEPEST_CONDITION}")
-            reached = all(condition.is_active for condition in conditions)
-            holds = reached and self._holds(name, place, arguments)
+            holds = _is_active(conditions) and self._holds(name, place, arguments)
             conditions.append(_Condition(place, holds, holds))
             return
         if not conditions:
@@ -151,7 +153,7 @@ class Preprocessor:
         if condition.in_else:
             raise IdlError(place, f"#{name} behind the #else of the same condition")
         condition.in_else = name == "else"
-        reached = all(outer.is_active for outer in conditions[:-1]) and not condition.was_active
+        reached = _is_active(conditions[:-1]) and not condition.was_active
         condition.is_active = reached and (name == "else" or self._holds("if", place, arguments))
         condition.was_active = condition.was_active or condition.is_active
 
@@ -192,7 +194,11 @@ class Preprocessor:
         found = self._find(place, name, path, is_quoted=is_quoted)
         if found.resolve() in self._once:
             return
-        yield from self._file(read_source(found, place), found, depth=depth + 1)
+        source = read_source(found, place)
+        self._octets += len(source.text)
+        if self._octets > MOST_OCTETS:
+            raise IdlError(place, f"all included files together have more than {MOST_OCTETS} octets")
+        yield from self._file(source, found, depth=depth + 1)
 
     def _find(self, place: Place, name: str, path: Path | None, *, is_quoted: bool) -> Path:
         own = [path.parent] if path is not None else []
@@ -210,6 +216,28 @@ class Preprocessor:
             self._once.add(path.resolve())
         elif words:
             yield Token(TokenKind.PRAGMA, " ".join(words), hash_.place)
+
+    def _opened(self, line: list[Token], opened: int | None) -> int | None:
+        """How many parentheses of a macro's call are open behind the line; None where the line ends no call early.
+
+        ``opened`` is what the line before said.  0: a call's name came last, its arguments may follow.
+        """
+        start = 0
+        if opened is None:
+            calls = (index for index, token in enumerate(line) if self._takes_parameters(token))
+            first = next(calls, None)
+            if first is None:
+                return None
+            start, opened = first + 1, 0
+            if start == len(line):
+                return 0
+        for token in line[start:]:
+            opened += {"(": 1, ")": -1}.get(token.text, 0)
+        return opened if opened > 0 else None
+
+    def _takes_parameters(self, token: Token) -> bool:
+        macro = self._macros.get(token.text) if token.kind is TokenKind.NAME else None
+        return macro is not None and macro.parameters is not None
 
     # --- macros ------------------------------------------------------------------------------------------
 
@@ -344,15 +372,5 @@ def _substituted(name: Token, macro: _Macro, arguments: list[list[Token]]) -> It
         yield from given.get(token.text, (token,)) if token.kind is TokenKind.NAME else (token,)
 
 
-def _is_inside_call(pending: deque[Token], macros: Mapping[str, _Macro]) -> bool:
-    """Whether a call of a macro with parameters may go on in the next line."""
-    calls = [index for index, token in enumerate(pending) if _takes_parameters(token, macros)]
-    if not calls:
-        return False
-    tokens = list(pending)[calls[0] :]
-    return sum({"(": 1, ")": -1}.get(token.text, 0) for token in tokens) > 0 or len(tokens) == 1
-
-
-def _takes_parameters(token: Token, macros: Mapping[str, _Macro]) -> bool:
-    macro = macros.get(token.text) if token.kind is TokenKind.NAME else None
-    return macro is not None and macro.parameters is not None
+def _is_active(conditions: Sequence[_Condition]) -> bool:
+    return not conditions or conditions[-1].is_active

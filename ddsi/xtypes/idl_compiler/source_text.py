@@ -10,8 +10,9 @@ It reads no files and knows no grammar.
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from ...structure.dataclass import dataclass
 from ...structure.errors import BadParameter
 
 __all__ = ["IdlError", "IdlWarning", "Place", "SourceText"]

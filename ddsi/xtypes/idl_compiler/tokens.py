@@ -45,7 +45,7 @@ class Token:
         return self.kind.value if self.kind is TokenKind.END else f"'{self.text}'"
 
 
-_SPACE = re.compile(r"(?:[ \t\r\f\v]|\\[ \t]*\r?\n)+")
+_SPACE = re.compile(r"(?:[ \t\r\f\v]+|\\[ \t]*\r?\n)+")
 _TOKEN = re.compile(
     r"""
     (?P<string>   L?"(?:[^"\\\n]|\\.)*" )
@@ -111,7 +111,7 @@ def _comment(source: SourceText, start: int) -> tuple[int, str]:
     text = source.text
     if text.startswith("//", start):
         end = text.find("\n", start)
-        while end > 0 and text[start:end].rstrip("\r").endswith("\\"):
+        while end > 0 and text[max(start, end - 2) : end].rstrip("\r").endswith("\\"):
             end = text.find("\n", end + 1)
         end = len(text) if end < 0 else end
         return end, text[start:end].lstrip("/!<").strip()

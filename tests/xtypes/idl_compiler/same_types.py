@@ -61,11 +61,12 @@ class _Comparison:
         found = self._values(one, other, "type_name", "extensibility", "is_nested")
         if isinstance(one, StructType):
             found = found or self.types(one.base, other.base)
-        is_struct = isinstance(one, StructType)
-        members = [composite.declared if is_struct else composite.cases for composite in (one, other)]
-        if not is_struct:  # IDL has no name for the discriminator
+        if isinstance(one, UnionType):  # IDL has no name for the discriminator
             mine, theirs = one.discriminator, other.discriminator
             found = found or self._values(mine, theirs, "is_key") or self.types(mine.type, theirs.type)
+        members = [
+            getattr(composite, "declared" if isinstance(one, StructType) else "cases") for composite in (one, other)
+        ]
         found = found or _unlike(*(len(side) for side in members))
         for mine, theirs in zip(*members, strict=False):
             found = found or self._members(mine, theirs)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddsi import idl
+from ddsi import deserialize, idl, serialize
 from ddsi.xtypes.idl_compiler.expressions import KEYWORDS
 
 DEEP = 1_000
@@ -38,8 +39,35 @@ HOSTILE: dict[str, tuple[str, str]] = {
         "calls of macros nest deeper",
     ),
     "a call without end": (
-        "#define F(x) x\nF(\n" + "1\n" * 3_000,
-        "the arguments of a macro have more than 500 tokens",
+        "#define F(x) x\nF(\n" + "1\n" * 11_000,
+        "the arguments of a macro have more than 10000 tokens",
+    ),
+    "dimensions": ("struct A { long x" + "[1]" * DEEP + "; };", "an array has 16 dimensions at most"),
+    "collections by typedef": (
+        "typedef long T0;\n"
+        + "".join(f"typedef sequence<T{n}> T{n + 1};\n" for n in range(13))
+        + "struct A { T13 x; };",
+        "sequences, arrays and maps nest deeper than 12",
+    ),
+    "structs in structs": (
+        "struct S0 { long x; };\n" + "".join(f"struct S{n + 1} {{ S{n} x; }};\n" for n in range(DEEP)),
+        "types nest deeper than 100",
+    ),
+    "unions in sequences": (
+        "struct S0 { long x; };\n"
+        + "".join(f"union S{n + 1} switch (long) {{ case 1: sequence<S{n}> x; }};\n" for n in range(DEEP)),
+        "types nest deeper than 100",
+    ),
+    "inherited members": (
+        "struct A { "
+        + "".join(f"long m{n}; " for n in range(1_000))
+        + "};"
+        + "".join(f"struct B{n} : A {{ long x; }};\n" for n in range(300)),
+        "all structs together inherit more than 200000 members",
+    ),
+    "keylists": (
+        "struct A { " + "".join(f"long m{n}; " for n in range(1_000)) + "};" + "\n#pragma keylist A m1" * 300,
+        "all structs together inherit more than 200000 members",
     ),
     "a long number": ("const long N = " + "9" * 5_000 + ";", "is no number"),
     "a large shift": ("const long N = 1 << 1000000000000;", "shifts by 0 to 63 bits"),
@@ -72,11 +100,32 @@ def test_files_that_include_each_other_twice_are_refused(tmp_path: Path) -> None
         idl.load(tmp_path / "0.idl")
 
 
+def test_included_files_are_bounded_in_octets(tmp_path: Path) -> None:
+    (tmp_path / "blank.idl").write_text(" " * (1 << 21))
+    (tmp_path / "a.idl").write_text('#include "blank.idl"\n' * 9)
+    with pytest.raises(idl.IdlError, match="all included files together have more than 16777216 octets"):
+        idl.load(tmp_path / "a.idl")
+
+
+def test_what_nests_as_deep_as_it_may_works() -> None:
+    """The bounds are such that codecs can be made, and values written and read."""
+    text = "typedef long T0;\n" + "".join(f"typedef sequence<T{n}> T{n + 1};\n" for n in range(12))
+    text += "struct S0 { T12 x; };\n" + "".join(f"struct S{n + 1} {{ S{n} x; }};\n" for n in range(99))
+    types = idl.loads(text)
+    deep: Any = [1]
+    for _ in range(11):
+        deep = [deep]
+    value = types.S0(deep)
+    for level in range(1, 100):
+        value = getattr(types, f"S{level}")(value)
+    assert deserialize(types.S99, serialize(value)) == value
+
+
 def test_long_flat_text_is_fine() -> None:
     """What is merely long goes through: sums, typedef chains, many types."""
     assert idl.loads("const long N = " + "1 + " * 20_000 + "1;").N == 20_001
     chain = "typedef long T0;\n" + "".join(f"typedef T{n} T{n + 1};\n" for n in range(2_000))
-    types = idl.loads(chain + "struct A { T2000 x; };")
+    types = idl.loads(chain + "// go on \\\n" * 2_000 + "\nstruct A { T2000 x; };")
     assert "int32 x;" in idl.to_idl(types.A)
     many = idl.loads("".join(f"enum E{n} {{ L{n} }};\n" for n in range(300)))
     assert len(list(many)) == 300
