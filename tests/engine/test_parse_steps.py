@@ -5,14 +5,24 @@ Honest is a datagram full of small samples, which is the most work that anybody 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import pytest
 
+from ddsi.messages.data import Data
+from ddsi.messages.interpreter import InfoSource
+from ddsi.messages.raw_submessage import SubmessageKind, iterate_submessages
+from ddsi.structure.builtin_entity_ids import (
+    PARTICIPANT_STATELESS_MESSAGE_READER,
+    PARTICIPANT_STATELESS_MESSAGE_WRITER,
+)
+from ddsi.structure.guid import GuidPrefix
 from ddsi.trace.reasons import DropReason
 from tests.engine.steps import steps_of
 from tests.engine.wire import Stranger, sent
 from tests.engine.worst import HONEST, MOST_OCTETS, WORST, listener
+from tests.fuzz.session import Ear, Session, recorded
 
 MOST_TIMES = 10
 MOST_SENT = 2 * MOST_OCTETS
@@ -50,6 +60,67 @@ def test_no_datagram_costs_more_than_ten_times_an_honest_one(name: str) -> None:
     steps, answered = cost(octets)
     assert steps <= MOST_TIMES * honest_steps(), f"{steps / honest_steps():.1f} times"
     assert answered <= MOST_SENT
+
+
+# --- to one with security, by somebody who has recorded what its peer said ------------------------------------------
+
+
+def _full_of(one: bytes) -> bytes:
+    head = recorded()[0][:20]
+    return head + one * ((MOST_OCTETS - len(head)) // len(one))
+
+
+def _envelopes(*, last: int = 0) -> bytes:
+    """The shortest that was recorded, again and again; ``last`` is laid over its last octet, in the MAC's postfix."""
+    found: list[bytes] = []
+    for octets in recorded():
+        start = -1
+        for raw in iterate_submessages(octets):
+            if raw.kind == SubmessageKind.SEC_PREFIX:
+                start = raw.offset
+            elif raw.kind == SubmessageKind.SEC_POSTFIX:
+                found.append(octets[start : raw.end])
+    one = min(found, key=len)
+    return _full_of(one[:-8] + bytes([one[-8] ^ last]) + one[-7:])
+
+
+def _messages(payload: bytes) -> bytes:
+    ids = (PARTICIPANT_STATELESS_MESSAGE_READER, PARTICIPANT_STATELESS_MESSAGE_WRITER)
+    return _full_of(Data(*ids, 9, None, payload).encode())
+
+
+def _newcomers() -> bytes:
+    """With the peer's tokens, which are no secret."""
+    spdp, out = recorded()[0], bytearray(recorded()[0][:20])
+    for number in range(MOST_OCTETS // (len(spdp) + 24)):
+        prefix = GuidPrefix(b"\1\x55" + number.to_bytes(10, "big"))
+        out += InfoSource((2, 4), b"\1\x55", prefix).encode() + spdp[20:].replace(spdp[8:20], prefix)
+    return bytes(out)
+
+
+SECURED: dict[str, Callable[[], bytes]] = {
+    "envelopes again": _envelopes,
+    "envelopes with a wrong MAC": lambda: _envelopes(last=1),
+    "envelopes of nothing": lambda: _full_of(b"\x31\1\x14\0" + bytes(20) + b"\x32\1\x14\0" + bytes(20)),
+    "messages of nothing": lambda: _messages(b"\0\1\0\0"),
+    "messages of zeros": lambda: _messages(b"\0\1\0\0" + bytes(100)),
+    "newcomers with tokens": _newcomers,
+}
+
+
+@pytest.mark.parametrize("name", SECURED)
+def test_neither_does_one_to_a_secured_participant(name: str) -> None:
+    octets = SECURED[name]()
+    assert MOST_OCTETS * 0.9 < len(octets) <= MOST_OCTETS
+    session = Session.make()
+    bob = Ear(session.bob.engine)
+    drops = bob.engine.drops.total()
+    steps = steps_of(lambda: bob.hear(octets, session.alice.port.locator))
+    assert steps <= MOST_TIMES * honest_steps(), f"{steps / honest_steps():.1f} times"
+    assert bob.engine.drops.total() > drops
+
+
+# --- and what is dropped for it -------------------------------------------------------------------------------------
 
 
 def test_what_is_too_much_for_one_message_is_counted_and_the_next_message_is_heard() -> None:
