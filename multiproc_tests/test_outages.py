@@ -73,7 +73,7 @@ def _pairs(outage: Outage, *, plays_all: bool) -> Iterator[tuple[Peer, Peer]]:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if metafunc.fixturenames[:3] != ["outage", "publisher", "subscriber"]:
         return
-    plays_all = metafunc.config.getoption("--all-peers", default=False)
+    plays_all = bool(metafunc.config.getoption("--all-peers", default=False))
     is_secured = metafunc.function is test_outage_of_a_secured_pair
     chosen = [
         pytest.param(
