@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -80,3 +81,37 @@ async def test_a_victim_that_strangers_announce_gets_no_more_than_they_sent(is_s
     assert all(is_announcement(each) for each in octets)
     assert sum(map(len, octets)) < int(sent[2])
     assert captured.count(f"udp && ip.dst == {SOURCE} && !icmp") == 0
+
+
+NOISE = """
+import socket, sys, time
+target, port = sys.argv[1], int(sys.argv[2])
+head = b"RTPS" + bytes((2, 4, 1, 0x55)) + b"a stranger.."
+out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+while True:
+    for octets in (
+        b"noise",
+        b"RTPS" + bytes((1, 0)) + bytes(20),
+        head + bytes((0x15, 5, 8, 0)) + bytes(8),
+        head + bytes((0x0E, 1, 12, 0)) + b"another one." + bytes((0x55, 1, 0, 0)),
+    ):
+        out.sendto(octets, (target, port))
+    time.sleep(0.1)
+"""
+
+
+@async_test
+async def test_ls_shows_what_was_dropped_by_its_reasons() -> None:
+    with namespace() as host:
+        async with scenario("strangers, and ddsi ls --stats", deadline=30) as stage:
+            await stage.start("stranger", [sys.executable, "-c", NOISE, host.address, str(PORT)], namespace=host)
+            words = ("ls", "--stats", "--json", "--domain", str(DOMAIN), "--time", "2")
+            ls = await stage.start(
+                "ls", [sys.executable, "-m", "ddsi.cli", *words], namespace=host,
+                environment=network_environment(host.interface),
+            )  # fmt: skip
+            await ls.expect_exit(0, timeout=20)
+    shown = json.loads("\n".join(line.text for line in ls.lines if line.stream == "out"))
+    reasons = {"not_rtps", "unsupported_version", "malformed_message", "not_for_us", "unsupported"}
+    assert reasons <= set(shown["stats"]["dropped"])
+    assert all(shown["stats"]["dropped"][reason] > 0 for reason in reasons)
