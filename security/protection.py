@@ -45,6 +45,7 @@ _INFO_TS: Final = int(SubmessageKind.INFO_TS)
 _NOTHING: Parts = ()
 _NONE, _MESSAGE, _SUBMESSAGE = int(Level.NONE), int(Level.MESSAGE), int(Level.SUBMESSAGE)
 _IMPOSSIBLE: Final = 1 << 8
+_DATAREADER_SUBMESSAGE: Final = SecureSubmessageCategory.DATAREADER_SUBMESSAGE
 _SMALL: Final = 1 << 12
 """Octets are quicker to take apart as ``bytes`` than through a view, unless it costs more to copy them."""
 
@@ -173,7 +174,7 @@ class Protection:
         whose = self._cryptographic.preprocess_secure_submsg(protected, self._local_participant, remote.crypto)
         if isinstance(whose, Outcome):
             return whose
-        is_readers = whose.category is SecureSubmessageCategory.DATAREADER_SUBMESSAGE
+        is_readers = whose.category is _DATAREADER_SUBMESSAGE
         sender = whose.datareader if is_readers else whose.datawriter
         pair = self._keys.by_handle.get(sender) if sender is not None else None
         if pair is None:

@@ -150,6 +150,22 @@ def test_the_short_way_opens_what_the_general_one_opens(data: st.DataObject) -> 
     assert short is None or short == opening._open(SUBMESSAGE, bytes(mutant), 0, keys, expected)
 
 
+@given(data=st.data())
+def test_the_short_way_of_payloads_opens_what_the_general_one_opens(data: st.DataObject) -> None:
+    keys, expected = ring(material(GCM)), Protection(encrypted=True)
+    genuine = vectors.PAYLOAD_ENCRYPTED_256
+    assert payload._open_usual(genuine, keys, expected) is None, "its session is new"
+    assert payload.decode_payload(genuine, keys, expected) == vectors.PAYLOAD
+    assert payload._open_usual(genuine, keys, expected) == vectors.PAYLOAD
+    mutant = bytearray(genuine)
+    for _ in range(data.draw(st.integers(1, 3))):
+        start = data.draw(st.integers(0, len(mutant)))
+        end = min(start + data.draw(st.integers(0, 8)), len(mutant))
+        mutant[start:end] = data.draw(st.binary(max_size=8) | st.just(bytes(mutant[start:end] * 2)))
+    short = payload._open_usual(bytes(mutant), keys, expected)
+    assert short is None or short == payload._open(bytes(mutant), bytes(mutant[:20]), keys.by_id[genuine[4:8]][0])
+
+
 @given(st.binary(max_size=300))
 def test_random_octets_have_an_outcome(octets: bytes) -> None:
     for _, open_it, _ in GENUINE.values():
