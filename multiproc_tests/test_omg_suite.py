@@ -15,7 +15,7 @@ import pytest
 
 from .framework import async_test, namespace
 from .omg import CASES, CYCLONE, FULL, OURS, PROGRAMS, QUICK, Effort, ShapeMain, SuiteCase, play
-from .omg.limits import known_limit
+from .omg.limits import LIMITS, known_limit
 from .omg.play import Unsupported
 from .peers.peer import ROOT, network_environment
 
@@ -102,5 +102,8 @@ def _read_until(terminal: int, words: bytes) -> None:
         seen += os.read(terminal, 4096)
 
 
-def test_what_is_quick_exists() -> None:
-    assert {*QUICK_AMONG_OURS, *QUICK_WITH_CYCLONE} <= {case.name for case in CASES}
+def test_what_is_quick_or_limited_exists() -> None:
+    names = {case.name for case in CASES}
+    assert {*QUICK_AMONG_OURS, *QUICK_WITH_CYCLONE} <= names
+    assert {name for name, _, _ in LIMITS} <= names
+    assert not any((name, OURS.name, OURS.name) in LIMITS for name in names), "what we cannot do is a failure"
