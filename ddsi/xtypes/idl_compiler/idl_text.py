@@ -312,11 +312,9 @@ class _Writer:
             case String():
                 return str(type_)
             case SequenceType(element=element, bound=bound):
-                limit = "" if bound is None else f", {bound}"
-                return f"sequence<{self._type(element, where)}{limit}>"
+                return _template("sequence", [self._type(element, where)], bound)
             case MapType(key=key, value=value, bound=bound):
-                limit = "" if bound is None else f", {bound}"
-                return f"map<{self._type(key, where)}, {self._type(value, where)}{limit}>"
+                return _template("map", [self._type(key, where), self._type(value, where)], bound)
             case ArrayType(element=element, dimensions=dimensions):
                 inner = self._type(element, where)
                 alias = self._free_name(f"{where}_array")
@@ -357,6 +355,12 @@ class _Writer:
         if _module(type_) == self._module:
             return _literal_name(literal)
         return "::" + "::".join((*map(_escaped, _module(type_)), _literal_name(literal)))
+
+
+def _template(name: str, parts: list[str], bound: int | None) -> str:
+    """``> >`` where one closes behind another: older compilers take two together for a shift."""
+    inside = ", ".join(parts if bound is None else [*parts, str(bound)])
+    return f"{name}<{inside}{' ' if inside.endswith('>') else ''}>"
 
 
 def _type_marks(type_: Composite) -> list[str]:
