@@ -7,8 +7,6 @@ an address that a participant merely claims, or a stranger could point our traff
 
 from __future__ import annotations
 
-import math
-
 from ..structure.discovered import DiscoveredParticipantData
 from ..structure.guid import Guid, GuidPrefix
 from ..structure.locator import Locator, LocatorKind
@@ -17,6 +15,7 @@ from ..structure.vendor import VendorId
 __all__ = ["ParticipantProxy"]
 
 _MAX_HOSTS = 8
+_LONGEST_LEASE_WITHOUT_ENDPOINTS = 100.0  # what a participant that names no lease has (RTPS 2.5 §8.5.3.2.1)
 
 
 class ParticipantProxy:
@@ -67,8 +66,15 @@ class ParticipantProxy:
 
     @property
     def lease_due(self) -> float:
-        """When it counts as gone unless something is heard of it."""
-        return self.last_heard + self.data.lease_duration if self.data.lease_duration < math.inf else math.inf
+        """When it counts as gone unless something is heard of it.
+
+        Who has announced no endpoint may be a forged announcement, that makes us send to a victim; so it is not
+        believed for ever, whatever its lease.
+        """
+        lease = self.data.lease_duration
+        if not self.endpoint_count:
+            lease = min(lease, _LONGEST_LEASE_WITHOUT_ENDPOINTS)
+        return self.last_heard + lease
 
     def heard_from(self, source: Locator) -> bool:
         """A datagram came from there; returns whether that is news: a host that it can now be reached at.

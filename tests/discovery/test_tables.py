@@ -69,7 +69,10 @@ def test_a_lease_counts_from_when_it_was_last_heard() -> None:
     assert participant.lease_due == 15.0
     participant.last_heard = 8.0
     assert participant.lease_due == 18.0
-    assert proxy(lease=math.inf).lease_due == math.inf
+    without_end = proxy(lease=math.inf)
+    assert without_end.lease_due == 105.0, "so long as it has said no more than hello"
+    without_end.endpoint_count = 1
+    assert without_end.lease_due == math.inf
 
 
 def test_nothing_is_sent_to_a_host_that_is_only_claimed() -> None:

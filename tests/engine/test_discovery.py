@@ -316,7 +316,8 @@ def test_anything_that_is_heard_renews_the_lease() -> None:
 def test_an_infinite_lease_never_ends() -> None:
     domain = Domain()
     a, b = domain.node(config=Config(lease_duration=math.inf, spdp_interval=5.0)), domain.node()
-    domain.run_until(domain.are_introduced, 5)
+    a.writer("Square", RELIABLE)
+    domain.run(5)
     a.kill()
     domain.run(100_000)
     assert knows(b, a)
