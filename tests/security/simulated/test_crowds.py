@@ -16,6 +16,7 @@ import pytest
 from ddsi.discovery.parameters import encode_participant
 from ddsi.messages.data import Data
 from ddsi.simulation import Domain, Node
+from ddsi.simulation.link import LinkConditions
 from ddsi.simulation.network import Port
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
@@ -169,3 +170,15 @@ def test_with_fewer_seats_fewer_go_on_at_once(identities: list[Properties]) -> N
     crowd.run(1.0)
     assert crowd.most_seated == 2
     assert crowd.time_until_admitted(crowd.domain.node(properties=few[0]), 30.0) <= 2 * TURN_S
+
+
+def test_honest_ones_with_a_seat_each_do_not_wait_for_each_other_in_a_circle(identities: list[Properties]) -> None:
+    """Each may have given its seat to one whose own is taken: what is said meanwhile is kept, and turns end.
+
+    A tenth of all messages is lost, and an answer takes a tenth of a second.
+    """
+    domain = Domain(6, conditions=LinkConditions(loss=0.1, delay=0.05, jitter=0.02))
+    single = [dict(properties, **{"dds.sec.auth.max_handshakes": "1"}) for properties in identities]
+    nodes = [domain.node(properties=properties) for properties in 2 * single]
+    pairs = [(first, second) for first in nodes for second in nodes if first is not second]
+    assert domain.run_until(lambda: all(are_introduced(*pair) for pair in pairs), 60.0)
