@@ -12,11 +12,10 @@ from random import Random
 
 from ddsi.engine import Compute, Participant, SendDatagram
 from ddsi.simulation import Domain, Node
-from ddsi.spi import SecurityHooks
+from ddsi.spi import SecurityHooks, load_hooks
 from ddsi.structure.locator import Locator
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import KeepAll, Reliable, TransientLocal
-from ddsi_security.service import load
 from tests.security.seam import DOMAIN, NOW_NS, properties_of
 
 __all__ = ["Ear", "Session", "recorded"]
@@ -55,7 +54,7 @@ def _node(domain: Domain, name: str) -> Node:
     properties = properties_of(name)
 
     def hooks() -> SecurityHooks:
-        return load(properties, entropy=Random(name).randbytes, wall_clock=lambda: NOW_NS)
+        return load_hooks(properties, entropy=Random(name).randbytes, wall_clock=lambda: NOW_NS)
 
     return domain.node(name=name, domain_id=DOMAIN, properties={**properties}, make_hooks=hooks)
 

@@ -322,7 +322,7 @@ class Flood:
 
 def main(arguments: Sequence[str]) -> None:
     """Print the memory after every tenth of the flood, and how large each table ever was."""
-    parser = argparse.ArgumentParser(prog="python -m tests.fuzz strangers", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz strangers", description="Strangers by the thousand")
     parser.add_argument("--datagrams", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
     chosen = parser.parse_args(arguments)
