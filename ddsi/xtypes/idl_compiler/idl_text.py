@@ -1,8 +1,8 @@
 """From types to IDL text: what ``ddsi.idl.to_idl`` does (OMG IDL 4.2).
 
 The text holds the type and all that it needs, in an order in which each name is known before it is used; read again, it
-gives the same types.  IDL has no name for an array inside a sequence or map, so such a one becomes a typedef.  What IDL
-cannot say (a comment, numpy as the form of values) is lost.
+gives the same types, typedefs included.  In IDL an array inside a sequence or map needs a name, so such a one becomes a
+typedef.  What IDL cannot say (numpy as the form of values) is lost, and so are comments.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import enum
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ...structure.errors import BadParameter
@@ -29,6 +30,7 @@ from ..model import (
     SequenceType,
     String,
     StructType,
+    Typedefs,
     UnionType,
 )
 from .expressions import KEYWORDS
@@ -37,6 +39,9 @@ from .python_names import literal_identifier
 __all__ = ["idl_text"]
 
 _Named = EnumType | BitmaskType | BitsetType | StructType | UnionType
+
+_Block = tuple[tuple[str, ...], list[str]]
+"""Some lines, and the module in which they stand."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _FOLDED_KEYWORDS = frozenset(word.lower() for word in KEYWORDS)
@@ -48,7 +53,7 @@ def idl_text(type_: _Named) -> str:
     """The IDL of a type and of what it needs.  BadParameter where its names are none in IDL, or collide."""
     order, recursive = _in_order(type_)
     writer = _Writer(order)
-    blocks: list[tuple[tuple[str, ...], list[str]]] = []
+    blocks: list[_Block] = []
     announced: set[int] = set()
     for index, named in enumerate(order):
         for forward in recursive.get(id(named), []):
@@ -56,11 +61,11 @@ def idl_text(type_: _Named) -> str:
                 announced.add(id(forward))
                 kind = "struct" if isinstance(forward, StructType) else "union"
                 blocks.append((_module(forward), [f"{kind} {_escaped(_path(forward)[-1])};"]))
-        blocks.append((_module(named), writer.definition(named)))
+        blocks += writer.definition(named)
     return "".join(_modules(blocks))
 
 
-def _modules(blocks: Sequence[tuple[tuple[str, ...], list[str]]]) -> Iterator[str]:
+def _modules(blocks: Sequence[_Block]) -> Iterator[str]:
     """The blocks, each inside the braces of its modules, which stay open as long as they can."""
     opened: tuple[str, ...] = ()
     for number, (module, lines) in enumerate(blocks):
@@ -166,6 +171,8 @@ class _Writer:
     def __init__(self, order: Sequence[_Named]) -> None:
         self._module: tuple[str, ...] = ()
         self._typedefs: list[str] = []
+        self._blocks: list[_Block] = []
+        self._aliases: dict[str, tuple[object, ...]] = {}
         self._taken: dict[str, str] = {}
         for module in sorted({_module(named)[:depth] for named in order for depth in range(1, len(_path(named)))}):
             self._take("::".join(module), f"the module {'::'.join(module)}")
@@ -185,9 +192,10 @@ class _Writer:
             )
         self._taken[path.lower()] = what
 
-    def definition(self, named: _Named) -> list[str]:
+    def definition(self, named: _Named) -> list[_Block]:
+        """The block of a type, behind those of the aliases that come up in it for the first time."""
         self._module = _module(named)
-        self._typedefs = []
+        self._typedefs, self._blocks = [], []
         match named:
             case EnumType():
                 lines = self._enum(named)
@@ -199,7 +207,7 @@ class _Writer:
                 lines = self._struct(named)
             case UnionType():
                 lines = self._union(named)
-        return [*self._typedefs, *lines]
+        return [*self._blocks, (_module(named), [*self._typedefs, *lines])]
 
     def _enum(self, type_: EnumType) -> list[str]:
         lines = [f"@bit_bound({type_.bit_bound})"] if type_.bit_bound != 32 else []
@@ -256,9 +264,12 @@ class _Writer:
 
     def _union(self, type_: UnionType) -> list[str]:
         name = _path(type_)[-1]
-        discriminator = type_.discriminator.type
+        discriminator, aliases = type_.discriminator.type, type_.discriminator.typedefs
         key = "@key " if type_.discriminator.is_key else ""
-        lines = [*_type_marks(type_), f"union {_escaped(name)} switch ({key}{self._type(discriminator, name)}) {{"]
+        lines = [
+            *_type_marks(type_),
+            f"union {_escaped(name)} switch ({key}{self._type(discriminator, aliases, name)}) {{",
+        ]
         due = 1
         for case in type_.cases:
             lines += [f"{_INDENT}case {self._label(discriminator, label)}:" for label in case.labels]
@@ -297,31 +308,75 @@ class _Writer:
     # --- types -------------------------------------------------------------------------------------------
 
     def _declarator(self, member: Member, owner: str) -> str:
-        """Type and name; the dimensions of an array stand behind the name."""
-        name, type_, dimensions = _escaped(member.name_in_idl), member.type, ""
-        if isinstance(type_, ArrayType):
-            dimensions = "".join(f"[{dimension}]" for dimension in type_.dimensions)
-            type_ = type_.element
-        return f"{self._type(type_, f'{owner}_{member.name_in_idl}')} {name}{dimensions}"
+        name = member.name_in_idl
+        return self._declared(member.type, member.typedefs, _escaped(name), f"{owner}_{name}")
 
-    def _type(self, type_: IdlType, where: str) -> str:
-        """``where`` names what needs a name."""
+    def _declared(self, type_: IdlType, aliases: Typedefs | None, name: str, where: str) -> str:
+        """Type and name; the dimensions of an array stand behind the name.  ``where`` names what needs a name."""
+        if not isinstance(type_, ArrayType) or self._alias(type_, aliases) is not None:
+            return f"{self._type(type_, aliases, where)} {name}"
+        dimensions, element = type_.dimensions, type_.element
+        if aliases is not None and aliases.rows:  # the element was an alias of an array
+            dimensions, element = dimensions[: aliases.rows], replace(type_, dimensions=dimensions[aliases.rows :])
+        size = "".join(f"[{dimension}]" for dimension in dimensions)
+        return f"{self._type(element, _part(aliases, 0), where)} {name}{size}"
+
+    def _type(self, type_: IdlType, aliases: Typedefs | None, where: str) -> str:
+        alias = self._alias(type_, aliases)
+        if alias is not None:
+            return alias
         match type_:
             case Primitive(name=name):
                 return _PRIMITIVES.get(name, name)
             case String():
                 return str(type_)
             case SequenceType(element=element, bound=bound):
-                return _template("sequence", [self._type(element, where)], bound)
+                return _template("sequence", [self._type(element, _part(aliases, 0), where)], bound)
             case MapType(key=key, value=value, bound=bound):
-                return _template("map", [self._type(key, where), self._type(value, where)], bound)
-            case ArrayType(element=element, dimensions=dimensions):
-                inner = self._type(element, where)
+                parts = [self._type(key, _part(aliases, 0), where), self._type(value, _part(aliases, 1), where)]
+                return _template("map", parts, bound)
+            case ArrayType():
+                declared = self._declared(type_, aliases, "\0", where)
                 alias = self._free_name(f"{where}_array")
-                self._typedefs.append(f"typedef {inner} {alias}{''.join(f'[{number}]' for number in dimensions)};")
+                self._typedefs.append(f"typedef {declared.replace(chr(0), alias)};")
                 return alias
             case _:
                 return self._reference(type_)
+
+    def _alias(self, type_: IdlType, aliases: Typedefs | None) -> str | None:
+        """The outermost alias by which a type was said, declared in a block of its own; None where there is none.
+
+        Nor is one used whose name is taken, or no name in IDL: then the type is said without.
+        """
+        if aliases is None or not aliases.names:
+            return None
+        bare = replace(aliases, names=())
+        for number, name in enumerate(aliases.names):
+            key, meaning = name.lower(), (str(type_), aliases.names[:number], bare)
+            if self._aliases.get(key) == meaning:
+                continue
+            *module, own_name = name.split("::")
+            if not self._is_free(name) or not all(_NAME.fullmatch(part) for part in (*module, own_name)):
+                return None
+            self._aliases[key], self._taken[key] = meaning, name
+            outer = self._module, self._typedefs
+            self._module, self._typedefs = tuple(module), []
+            if number:
+                declared = f"{self._path_reference(aliases.names[number - 1])} {_escaped(own_name)}"
+            else:
+                declared = self._declared(type_, bare, _escaped(own_name), own_name)
+            self._blocks.append((self._module, [*self._typedefs, f"typedef {declared};"]))
+            self._module, self._typedefs = outer
+        return self._path_reference(aliases.names[-1])
+
+    def _is_free(self, name: str) -> bool:
+        """Whether an alias may have this name, and its modules theirs."""
+        parts = name.split("::")
+        for depth in range(1, len(parts)):
+            module = "::".join(parts[:depth])
+            if self._taken.setdefault(module.lower(), f"the module {module}") != f"the module {module}":
+                return False
+        return name.lower() not in self._taken
 
     def _free_name(self, name: str) -> str:
         number, candidate = 2, name
@@ -331,7 +386,11 @@ class _Writer:
         return candidate
 
     def _reference(self, named: _Named) -> str:
-        path = _path(named)
+        return self._path_reference("::".join(_path(named)))
+
+    def _path_reference(self, name: str) -> str:
+        """A name as it is said here: alone in its own module, absolute elsewhere."""
+        path = tuple(name.split("::"))
         if path[:-1] == self._module:
             return _escaped(path[-1])
         return "::" + "::".join(map(_escaped, path))
@@ -355,6 +414,11 @@ class _Writer:
         if _module(type_) == self._module:
             return _literal_name(literal)
         return "::" + "::".join((*map(_escaped, _module(type_)), _literal_name(literal)))
+
+
+def _part(aliases: Typedefs | None, number: int) -> Typedefs | None:
+    """Those of an element (0), or of a map's key (0) and value (1)."""
+    return aliases.parts[number] if aliases is not None and aliases.parts else None
 
 
 def _template(name: str, parts: list[str], bound: int | None) -> str:

@@ -129,10 +129,7 @@ class PythonSource:
                 return self.names[type_]
 
     def _alias(self, alias: Alias, name: str) -> list[str]:
-        if _is_class(alias):
-            type_ = self.type(unaliased(alias))
-        else:
-            type_ = _annotated(self.type(alias.type), _typedef(alias))
+        type_ = self.type(unaliased(alias)) if _is_class(alias) else _annotated(self.type(alias.type), _typedef(alias))
         if self._is_lazy(alias.type):  # in quotes, since it names what comes further down
             self._lazy.add(alias)
             return [laid_out(quoted(str(type_)), f"{name}: TypeAlias = ")]

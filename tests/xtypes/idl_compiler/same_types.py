@@ -18,13 +18,14 @@ from ddsi.xtypes.model import (
 )
 
 
-def difference(one: IdlType | None, other: IdlType | None) -> str:
-    """Where two types differ first; empty where they do not."""
-    return _Comparison().types(one, other)
+def difference(one: IdlType | None, other: IdlType | None, *, typedefs: bool = True) -> str:
+    """Where two types differ first; empty where they do not.  ``typedefs``: those by which they were said count too."""
+    return _Comparison(with_typedefs=typedefs).types(one, other)
 
 
 class _Comparison:
-    def __init__(self) -> None:
+    def __init__(self, *, with_typedefs: bool) -> None:
+        self._with_typedefs = with_typedefs
         self._begun: set[tuple[int, int]] = set()
 
     def types(self, one: IdlType | None, other: IdlType | None) -> str:
@@ -76,6 +77,8 @@ class _Comparison:
         flags = ("name_in_idl", "id", "is_key", "is_optional", "must_understand", "is_external", "is_serialized")
         found = self._values(one, other, *flags, *(("labels", "is_default") if hasattr(one, "labels") else ()))
         defaults = [None if member.default is None else member.default() for member in (one, other)]
+        if self._with_typedefs:
+            found = found or self._values(one, other, "typedefs")
         found = found or _unlike(*defaults) or self.types(one.type, other.type)
         return found and f"{one.name}: {found}"
 
