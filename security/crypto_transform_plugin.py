@@ -44,7 +44,8 @@ class CryptoTransform(Protocol):
 
     Encoders append to a buffer of the caller's, which they leave as it was when they refuse; a refusal means that
     nothing is sent.  They encode for all receivers at once: the OMG's ``..._list_index`` has no part here.
-    Decoders return the plain octets, or why there are none: not for us, no keys, rejected.
+    Decoders return the plain octets, or why there are none: not for us, no keys, rejected.  They may write into the
+    octets that they are given, where these can be written to, and return parts of them: nobody reads them again.
     """
 
     def overhead(
