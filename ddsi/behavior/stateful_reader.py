@@ -214,13 +214,19 @@ class StatefulReader:
         proxy.last_seq = max(proxy.last_seq, number)
         if number in proxy.reorder:
             self._on_dropped(DropReason.DUPLICATE, proxy.guid, number)
-        while number not in proxy.reorder and not proxy.reorder.add(change):
+        else:
+            self._keep(proxy, change)
+        proxy.schedule.arrived(now, number)
+        self._progressed(proxy, now)
+
+    def _keep(self, proxy: WriterProxy, change: CacheChange) -> None:
+        """Until its turn comes.  Where there is no room, what is farther off gives way."""
+        number = change.sequence_number
+        while not proxy.reorder.add(change):
             farthest = proxy.reorder.drop_farthest(beyond=number)
             self._on_dropped(DropReason.TABLE_FULL_REORDER, proxy.guid, farthest or number)
             if not farthest:
-                break
-        proxy.schedule.arrived(now, number)
-        self._progressed(proxy, now)
+                return
 
     def receive_gap(self, proxy: WriterProxy, start: int, numbers: NumberSet, now: float) -> None:
         """GAP.  RTPS 2.5 §8.3.8.4, §8.4.12.2.8."""
