@@ -115,7 +115,7 @@ from .structure.status import (
     SubscriptionMatched,
 )
 from .structure.time import Time
-from .xtypes import deserialize, idl, key_hash, serialize
+from .xtypes import deserialize, idl, key_hash, serialize, type_information
 
 XCDR1 = DataRepresentationId.XCDR1
 XCDR2 = DataRepresentationId.XCDR2
@@ -219,4 +219,5 @@ __all__ = [
     "key_hash",
     "secure",
     "serialize",
+    "type_information",
 ]

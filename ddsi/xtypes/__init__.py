@@ -2,7 +2,17 @@
 
 from . import idl
 from .model import Extensibility
-from .octets import deserialize, key_hash, serialize
+from .octets import deserialize, key_hash, serialize, type_information
 from .type_support import Octets, TypeSupport, type_support
 
-__all__ = ["Extensibility", "Octets", "TypeSupport", "deserialize", "idl", "key_hash", "serialize", "type_support"]
+__all__ = [
+    "Extensibility",
+    "Octets",
+    "TypeSupport",
+    "deserialize",
+    "idl",
+    "key_hash",
+    "serialize",
+    "type_information",
+    "type_support",
+]

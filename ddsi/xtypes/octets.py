@@ -6,13 +6,18 @@ at the end, which writers add for transport, is neither made nor missed here.
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..structure.errors import BadParameter
 from ..structure.qos_policies import DataRepresentationId
+from .model import StructType, UnionType
+from .resolution import named_type
 from .type_support import Octets, TypeSupport, type_support
 
-__all__ = ["deserialize", "key_hash", "serialize"]
+if TYPE_CHECKING:
+    from .type_object import TypeInformation
+
+__all__ = ["deserialize", "key_hash", "serialize", "type_information"]
 
 T = TypeVar("T")
 
@@ -59,3 +64,19 @@ def _support_of(sample: object) -> TypeSupport[Any]:
     if isinstance(sample, type):
         raise BadParameter(f"a sample is asked for, not the class {sample.__name__}")
     return type_support(sample.__class__)
+
+
+def type_information(python_class: type[Any]) -> TypeInformation:
+    """The TypeInformation of a class that is a topic type: ``.minimal`` and ``.complete`` are its TypeIdentifiers.
+
+    ``type_information(ShapeType).minimal.hex()`` gives the 14 octets of the hash; two types with the same minimal
+    hash can be assigned to each other.  DDS-XTypes 1.3 §7.6.3.2.1.
+
+    Raises BadParameter for a class that is neither struct nor union, or whose annotations cannot be resolved.
+    """
+    from .type_object import describe
+
+    found = named_type(python_class)
+    if not isinstance(found, (StructType, UnionType)):
+        raise BadParameter(f"{python_class.__name__} is no topic type; decorate a class with @idl.struct")
+    return describe(found).information

@@ -1,0 +1,32 @@
+"""What types are to other programs: TypeIdentifiers, TypeObjects, TypeInformation (DDS-XTypes 1.3 §7.3.4, §7.6.3).
+
+``describe`` gives those of a type of ours; the ``decode`` functions read what peers send.
+"""
+
+from .builder import BuiltTypes
+from .description import TypeDescription, describe
+from .identifiers import (
+    ComponentIdentifier,
+    HashedIdentifier,
+    HashIdentifier,
+    TypeIdentifier,
+    decode_identifier,
+    encode_identifier,
+)
+from .information import TypeInformation, decode_type_information
+from .objects import TypeObject
+
+__all__ = [
+    "BuiltTypes",
+    "ComponentIdentifier",
+    "HashIdentifier",
+    "HashedIdentifier",
+    "TypeDescription",
+    "TypeIdentifier",
+    "TypeInformation",
+    "TypeObject",
+    "decode_identifier",
+    "decode_type_information",
+    "describe",
+    "encode_identifier",
+]

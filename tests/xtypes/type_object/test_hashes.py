@@ -1,0 +1,105 @@
+"""TypeIdentifiers, TypeObjects and TypeInformation are, octet for octet, those of a real peer."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import pytest
+
+import ddsi
+from ddsi.structure.errors import BadParameter
+from ddsi.xtypes.definition import struct_type
+from ddsi.xtypes.type_object import BuiltTypes, ComponentIdentifier, describe, encode_identifier
+from tests.xtypes.vector_types import S01, S09, S33, S07Color
+
+from .vectors import VECTORS, compiled
+
+by_name = pytest.mark.parametrize("vector", VECTORS, ids=[vector["name"] for vector in VECTORS])
+by_kind = pytest.mark.parametrize("kind", ["minimal", "complete"])
+
+
+def built(type_: type[Any], kind: str) -> BuiltTypes:
+    description = describe(struct_type(type_))
+    return description.minimal if kind == "minimal" else description.complete
+
+
+def test_every_vector_is_driven() -> None:
+    assert len(VECTORS) == 37
+    assert sum("type_objects_minimal" in vector for vector in VECTORS) == 33
+    assert sum("type_mapping" in vector for vector in VECTORS) == 4
+
+
+@by_kind
+@by_name
+def test_the_identifier_is_the_peers(vector: dict[str, Any], kind: str) -> None:
+    types = built(compiled(vector), kind)
+    assert encode_identifier(types.root).hex() == vector[f"type_identifier_{kind}"]
+    assert len(types.octets[types.root]) == vector[f"type_object_{kind}_size"]
+
+
+@by_kind
+@by_name
+def test_every_type_object_is_the_peers(vector: dict[str, Any], kind: str) -> None:
+    octets = {encode_identifier(identifier).hex(): text.hex() for identifier, text in built_octets(vector, kind)}
+    if "type_mapping" in vector:  # one sequence of all pairs, each at its own alignment
+        assert all(identifier in vector["type_mapping"] for identifier in octets)
+        assert all(text in vector["type_mapping"] for text in octets.values())
+    else:
+        assert octets == vector[f"type_objects_{kind}"]
+
+
+def built_octets(vector: dict[str, Any], kind: str) -> Any:
+    return built(compiled(vector), kind).octets.items()
+
+
+@by_name
+def test_the_type_information_is_what_the_peer_announces(vector: dict[str, Any]) -> None:
+    assert ddsi.type_information(compiled(vector)).encode().hex() == vector["type_information"]
+
+
+def test_types_written_in_python_are_the_same_types() -> None:
+    information = ddsi.type_information(S01)
+    assert information.minimal.hex() == "a512f395e2bab0b9fc838e086e2c"
+    assert information.complete.hex() == "773207fb72386e0ddb0e1a2b4fbe"
+    assert repr(information.minimal) == "<minimal a512f395e2bab0b9fc838e086e2c>"
+
+
+def test_a_type_without_typedefs_is_recursive_by_itself_alone() -> None:
+    minimal = ddsi.type_information(S33).minimal
+    assert isinstance(minimal, ComponentIdentifier)
+    assert (minimal.length, minimal.index) == (1, 1)
+    assert ddsi.type_information(S33).minimal_types.dependencies == ()
+
+
+def test_the_names_of_members_are_those_in_idl() -> None:
+    @ddsi.idl.struct(typename="T")
+    class One:
+        from_: Annotated[ddsi.idl.int32, ddsi.idl.name("from")]
+
+    @ddsi.idl.struct(typename="T")
+    class Other:
+        origin: Annotated[ddsi.idl.int32, ddsi.idl.name("from")]
+
+    assert ddsi.type_information(One) == ddsi.type_information(Other)
+
+
+def test_what_is_no_topic_type_is_refused() -> None:
+    with pytest.raises(BadParameter, match="int does not say its width"):
+        ddsi.type_information(int)
+    with pytest.raises(BadParameter, match="S07Color is no topic type"):
+        ddsi.type_information(S07Color)
+
+
+def test_names_that_are_not_defined_are_refused() -> None:
+    @ddsi.idl.struct
+    class Lost:
+        x: Nowhere  # type: ignore[name-defined]  # noqa: F821
+
+    with pytest.raises(BadParameter, match="Lost: an annotation cannot be resolved: name 'Nowhere'"):
+        ddsi.type_information(Lost)
+
+
+def test_each_type_is_listed_once_and_not_among_its_own_dependencies() -> None:
+    types = ddsi.type_information(S09).minimal_types
+    assert types.dependency_count == len(types.dependencies) == 4
+    assert types.type not in types.dependencies
