@@ -28,6 +28,27 @@ class Options(enum.IntFlag):
     LOUD = 2
 
 
+@idl.union(extensibility=idl.FINAL)
+class Measurement:
+    kind: Color = idl.switch
+    count: idl.int32 = idl.case(Color.RED)
+    text: str = idl.case(default=True)
+
+
+@idl.bitset()
+class Bits:
+    low: Annotated[idl.uint8, idl.bits(3)] = 0
+    flag: Annotated[idl.boolean, idl.bits(1)] = False
+
+
+@idl.struct
+class Collected:
+    measurements: idl.sequence[Measurement]
+    by_name: idl.map[str, Measurement]
+    bits: Bits
+    wide: Annotated[idl.wstring, idl.bound(8)]
+
+
 @idl.struct
 class Point:
     x: idl.float64 = 0.0
@@ -81,6 +102,13 @@ def program() -> None:
     assert again == shape
     assert_type(Named(label="x").label, str)
     assert repr(Named(1, label="x")) == "Named(x=1, y=0.0, label='x')"
+    measured = Collected([Measurement(count=1)], {"x": Measurement(kind=Color.GREEN, text="y")}, Bits(low=3), "wide")
+    assert_type(measured.by_name["x"].text, str)
+    assert_type(measured.measurements[0].kind, Color)
+    assert_type(measured.bits.flag, bool)
+    assert_type(measured.wide, str)
+    assert deserialize(Collected, serialize(measured)) == measured
+    assert "struct Collected" in idl.to_idl(Collected)
 
 
 if __name__ == "__main__":

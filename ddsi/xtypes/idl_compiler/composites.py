@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from .. import model
-from ..annotations import autoid_hash
+from ..annotations import LARGEST_MEMBER_ID, autoid_hash
 from ..model import Extensibility, Primitive, String
 from .annotations import Annotations
 from .constants import evaluate, fitted
@@ -269,6 +269,8 @@ class CompositeAnalysis:
             id_ = autoid_hash(hash_name or name)
         else:
             id_ = next_id
+        if id_ > LARGEST_MEMBER_ID:
+            raise IdlError(place, f"{name} has the member id {id_:#x}, and {LARGEST_MEMBER_ID:#x} is the largest")
         return MemberDeclaration(
             name,
             type_,

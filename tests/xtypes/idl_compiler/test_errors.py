@@ -152,6 +152,12 @@ ERRORS: dict[str, tuple[str, int, int, str]] = {
     "id twice": ("struct A { @id(3) long x; @id(3) long y; };", 1, 39, "y has the member id 0x3, and so has x"),
     "id too large": ("struct A { @id(0x10000000) long x; };", 1, 16, "@id takes a number from 0 to 268435455"),
     "id without number": ("struct A { @id long x; };", 1, 12, "@id takes a number, as in @id(...)"),
+    "id behind the largest": (
+        "struct A { @id(0xFFFFFFF) long x; long y; };",
+        1,
+        40,
+        "y has the member id 0x10000000, and 0xfffffff is the largest",
+    ),
     "optional key": ("struct A { @key @optional long x; };", 1, 32, "x is key, and so cannot be optional"),
     "key beside the base's": (
         "struct A { @key long x; };\nstruct B : A { @key long y; };",
