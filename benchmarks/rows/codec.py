@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from benchmarks.benchmark import Benchmark, Better, Figure, Side
+from benchmarks.benchmark import FLOOR, OURS, PEER, Benchmark, Better, Figure, Side
 from benchmarks.session import Session
 
 __all__ = ["BENCHMARKS"]
@@ -30,6 +30,7 @@ BENCHMARKS = tuple(
         f"{role} one sample ({'ShapeType' if not octets else f'{label} of octets'})",
         (Figure(name, "us", Better.LOWER),),
         _measure(role, name, octets, count),
+        (OURS, PEER, FLOOR),
     )
     for role in ("serialise", "deserialise")
     for label, (octets, count) in _SAMPLES.items()

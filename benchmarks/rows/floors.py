@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from benchmarks.benchmark import FLOOR, Benchmark, Better, Figure, Side
 from benchmarks.session import Session
@@ -13,6 +14,7 @@ __all__ = ["BENCHMARKS"]
 
 _UDP = "floor/udp"
 _CHECKPOINTS = 20_000
+_BURSTS = 400
 
 
 def _round_trip_through_trio(side: Side, session: Session) -> Mapping[str, float]:
@@ -30,8 +32,22 @@ def _floor(name: str, summary: str, measure: Callable[[Side, Session], Mapping[s
     return Benchmark(name, summary, (Figure(name, "us", Better.LOWER),), measure, (FLOOR,))
 
 
+def _aead(label: str, octets: int) -> Benchmark:
+    name = f"floor/aead/{label}"
+
+    def measure(side: Side, session: Session) -> Mapping[str, float]:
+        worker = session.start_module("benchmarks.sides.aead", "bare", octets=octets, count=session.count(_BURSTS))
+        found = worker.result()
+        return {name: found.pop("encrypt_us")} | found
+
+    side = replace(FLOOR, distribution="cryptography")
+    return Benchmark(name, f"one bare AES-GCM call, {label}", (Figure(name, "us", Better.LOWER),), measure, (side,))
+
+
 BENCHMARKS = (
     _floor("floor/trio", "a UDP ping-pong between two bare trio loops, median", _round_trip_through_trio),
     _floor("floor/checkpoint", "one trio checkpoint", _one_process("floor/checkpoint", "checkpoint", _CHECKPOINTS)),
+    _aead("64B", 64),
+    _aead("64KiB", 1 << 16),
     _floor(_UDP, "send and receive one small datagram, one process", _one_process(_UDP, "datagram", _CHECKPOINTS)),
 )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from benchmarks.benchmark import Benchmark, Better, Figure, Side
+from benchmarks.benchmark import FLOOR, OURS, PEER, Benchmark, Better, Figure, Side
 from benchmarks.session import Session
 
 __all__ = ["BENCHMARKS", "measure_throughput"]
@@ -54,6 +54,7 @@ BENCHMARKS = tuple(
         f"reliable samples received in a second ({'ShapeType' if not octets else f'{label} of octets'})",
         (Figure(name, "samples/s", Better.HIGHER),),
         _measure(name, octets, count),
+        (OURS, PEER, FLOOR),
     )
     for label, (octets, count) in _SAMPLES.items()
 )

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import socket
+import struct
 import time
+from collections.abc import Callable, Iterator
 
 import trio
 
 from .memory import resident_mib
-from .protocol import play, say_ready, summarise_round_trips
+from .protocol import PAYLOAD_BYTE, play, say_ready, summarise_round_trips
 
 _OCTETS = b"\0" * 128  # about as much as the RTPS message of one ShapeType
 _WARM_UP = 100
 _PATIENCE_S = 30.0
+# What is under way before the receiver has to answer: less than a socket's buffer takes by default.
+_WINDOW_OCTETS = 128 * 1024
+_WINDOW_DATAGRAMS = 64
+_DATAGRAM_OCTETS = 60 * 1024
 # Ports follow the domain, as DDS's do, so that two runs at once do not meet; below those of domain 0.
 _FIRST_PORT = 7_100
 
@@ -75,6 +81,80 @@ async def _ping_in_trio(sock: socket.socket, to: tuple[str, int], count: int) ->
     return summarise_round_trips(seconds[_WARM_UP:], time.process_time() - processor)
 
 
+# --- throughput ------------------------------------------------------------------------------------------
+
+
+def receive(domain: int, octets: int, count: int) -> dict[str, float]:
+    """Answers each window with one octet; a sample that is larger than a datagram comes in several."""
+    sock = _socket(_FIRST_PORT + domain)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 * _WINDOW_OCTETS)
+    say_ready()
+    sock.settimeout(_PATIENCE_S)
+    buffer = bytearray(65536)
+    start = processor = 0.0
+    for batch in _batches(octets, count):
+        for _ in range(batch):
+            _, address = sock.recvfrom_into(buffer)
+            if not start:
+                start, processor = time.perf_counter(), time.process_time()
+        sock.sendto(b"\0", address)
+    seconds, used = time.perf_counter() - start, time.process_time() - processor
+    return {"per_second": (count - 1) / seconds, "processor_us": used / count * 1e6}
+
+
+def send(domain: int, octets: int, count: int) -> dict[str, float]:
+    sock = _socket(0)
+    sock.settimeout(_PATIENCE_S)
+    to = ("127.0.0.1", _FIRST_PORT + domain)
+    datagram = bytes(_datagram_octets(octets))
+    processor = time.process_time()
+    for batch in _batches(octets, count):
+        for _ in range(batch):
+            sock.sendto(datagram, to)
+        sock.recv(1)
+    return {"processor_us": (time.process_time() - processor) / count * 1e6}
+
+
+def _datagram_octets(octets: int) -> int:
+    return min(octets or len(_OCTETS), _DATAGRAM_OCTETS)
+
+
+def _batches(octets: int, count: int) -> Iterator[int]:
+    """So many datagrams at a time as fit into a socket's buffer."""
+    datagrams = count * max(-(-octets // _DATAGRAM_OCTETS), 1)
+    batch = max(_WINDOW_OCTETS // max(_datagram_octets(octets), _WINDOW_OCTETS // _WINDOW_DATAGRAMS), 1)
+    for first in range(0, datagrams, batch):
+        yield min(batch, datagrams - first)
+
+
+# --- codec -----------------------------------------------------------------------------------------------
+
+_SHAPE = struct.Struct("<4xI5s3xiii")
+
+
+def serialise(octets: int, count: int) -> dict[str, float]:
+    """One copy; of a ShapeType, what `struct` makes of its members."""
+    if octets:
+        payload = PAYLOAD_BYTE * octets
+        return _microseconds(lambda: bytearray(payload), count)
+    return _microseconds(lambda: _SHAPE.pack(5, b"BLUE", 7, 20, 30), count)
+
+
+def deserialise(octets: int, count: int) -> dict[str, float]:
+    if octets:
+        return serialise(octets, count)
+    data = _SHAPE.pack(5, b"BLUE", 7, 20, 30)
+    return _microseconds(lambda: _SHAPE.unpack(data), count)
+
+
+def _microseconds(operation: Callable[[], object], count: int) -> dict[str, float]:
+    operation()
+    start = time.perf_counter()
+    for _ in range(count):
+        operation()
+    return {"us": (time.perf_counter() - start) / count * 1e6}
+
+
 # --- one process -----------------------------------------------------------------------------------------
 
 
@@ -111,4 +191,16 @@ def idle(domain: int) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    play({"echo": echo, "ping": ping, "checkpoint": checkpoint, "datagram": datagram, "idle": idle})
+    play(
+        {
+            "echo": echo,
+            "ping": ping,
+            "receive": receive,
+            "send": send,
+            "serialise": serialise,
+            "deserialise": deserialise,
+            "checkpoint": checkpoint,
+            "datagram": datagram,
+            "idle": idle,
+        }
+    )
