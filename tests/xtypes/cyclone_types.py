@@ -5,12 +5,24 @@
 from dataclasses import dataclass
 from typing import Optional
 
-from cyclonedds.idl import IdlStruct
+from cyclonedds.idl import IdlStruct, IdlUnion
 from cyclonedds.idl._support import Endianness
 from cyclonedds.idl.annotations import appendable, final, key, mutable
-from cyclonedds.idl.types import array, bounded_str, float32, float64, int32, int64, sequence, uint8
+from cyclonedds.idl.types import (
+    array,
+    bounded_str,
+    case,
+    default,
+    float32,
+    float64,
+    int16,
+    int32,
+    int64,
+    sequence,
+    uint8,
+)
 
-__all__ = ["Endianness", "PeerMessage", "PeerPoint", "PeerShape"]
+__all__ = ["Endianness", "PeerChoice", "PeerChoices", "PeerMessage", "PeerPoint", "PeerShape"]
 
 
 @dataclass
@@ -42,3 +54,19 @@ class PeerMessage(IdlStruct, typename="Message"):
     values: sequence[float64]
     corners: array[PeerPoint, 2]
     note: Optional[str]  # noqa: UP045 - the binding does not know the other form
+
+
+@appendable
+class PeerChoice(IdlUnion, discriminator=int16, typename="Choice"):
+    number: case[1, int64]
+    texts: case[[2, -3], sequence[str]]
+    point: default[PeerPoint]
+
+
+@dataclass
+@appendable
+class PeerChoices(IdlStruct, typename="Choices"):
+    before: uint8
+    choice: PeerChoice
+    more: sequence[PeerChoice]
+    after: float64

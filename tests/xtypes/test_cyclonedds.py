@@ -42,6 +42,16 @@ class Message:
     note: str | None
 
 
+COMPILED: Any = idl.loads("""
+    @final struct Point { octet id; double x; float y; };
+    @appendable union Choice switch (short) {
+      case 1: long long number;
+      case 2: case -3: sequence<string> texts;
+      default: Point point;
+    };
+    @appendable struct Choices { octet before; Choice choice; sequence<Choice> more; double after; };
+""")
+
 INT32 = st.integers(-(2**31), 2**31 - 1)
 TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=32)
 FLOAT32 = st.floats(width=32, allow_nan=False)
@@ -84,7 +94,36 @@ def test_mutable_messages_are_the_same_octets(version: str, byteorder: Any, samp
     agree(sample, peer, version, byteorder)
 
 
-def peer_point(point: Point) -> Any:
+INT64 = st.integers(-(2**63), 2**63 - 1)
+COMPILED_POINTS = st.builds(COMPILED.Point, st.integers(0, 255), st.floats(allow_nan=False), FLOAT32)
+CHOICES = (
+    st.builds(COMPILED.Choice, number=INT64)
+    | st.builds(COMPILED.Choice, discriminator=st.sampled_from((2, -3)), texts=st.lists(TEXT, max_size=3))
+    | st.builds(COMPILED.Choice, discriminator=st.integers(3, 2**15 - 1), point=COMPILED_POINTS)
+)
+SAMPLES_OF_CHOICES = st.builds(
+    COMPILED.Choices, st.integers(0, 255), CHOICES, st.lists(CHOICES, max_size=3), st.floats(allow_nan=False)
+)
+
+
+@pytest.mark.parametrize("byteorder", ["little", "big"])
+@settings(max_examples=60)
+@given(sample=SAMPLES_OF_CHOICES)
+def test_unions_compiled_from_idl_are_the_same_octets(byteorder: Any, sample: Any) -> None:
+    peer = peers.PeerChoices(
+        sample.before, peer_choice(sample.choice), [peer_choice(choice) for choice in sample.more], sample.after
+    )
+    agree(sample, peer, "XCDR2", byteorder)
+
+
+def peer_choice(choice: Any) -> Any:
+    selected = idl.selected_member(choice)
+    value = getattr(choice, selected or "")
+    value = peer_point(value) if selected == "point" else value
+    return peers.PeerChoice(discriminator=choice.discriminator, value=value)
+
+
+def peer_point(point: Any) -> Any:
     return peers.PeerPoint(point.id, point.x, point.y)
 
 
