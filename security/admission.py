@@ -124,6 +124,16 @@ class AdmissionDesk:
         self._changed()
         self._call_next(now)
 
+    def close(self) -> None:
+        """Our participant is no more: all are forgotten, and whoever waits is called no more."""
+        for remote in self._remotes.values():
+            self._release(remote)
+        self._remotes.clear()
+        self._jobs.clear()
+        self._timers.clear()
+        self._plugins.authentication.set_listener(None)
+        self._plugins.access_control.set_listener(None)
+
     def _handshake(self, remote: RemoteParticipant, identity_token: DataHolder) -> Handshake:
         authentication, own = self._plugins.authentication, self._own
 

@@ -6,6 +6,7 @@ fails here, in the very call that asked for it, and leaves nothing behind.
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from typing import Final, TypeVar, cast
 
 from ddsi.serialization import ParameterId
@@ -43,23 +44,33 @@ class OwnParticipant:
         identity = settled(authentication.validate_local_identity(candidate.domain_id, properties, candidate.guid))
         self.identity = identity.handle
         self.guid = identity.adjusted_participant_guid
-        self.permissions = settled(
-            access.validate_local_permissions(
-                authentication, self.identity, candidate.domain_id, properties, domain_tag=candidate.domain_tag
+        with ExitStack() as undo:
+            undo.callback(authentication.return_identity_handle, self.identity)
+            self.permissions = settled(
+                access.validate_local_permissions(
+                    authentication, self.identity, candidate.domain_id, properties, domain_tag=candidate.domain_tag
+                )
             )
-        )
-        _insist(access.check_create_participant(self.permissions, candidate.domain_id, properties))
-        self.permissions_token = access.get_permissions_token(self.permissions)
-        authentication.set_permissions_credential_and_token(
-            self.identity, access.get_permissions_credential_token(self.permissions), self.permissions_token
-        )
-        self.attributes = access.get_participant_sec_attributes(self.permissions)
-        self.info = participant_info(self.attributes)
-        self.crypto = plugins.cryptographic.register_local_participant(
-            self.identity, self.permissions, properties, self.attributes
-        )
-        self.endpoints: dict[Guid, LocalEndpoint] = {}
-        self._register_builtin_endpoints()
+            undo.callback(access.return_permissions_handle, self.permissions)
+            _insist(access.check_create_participant(self.permissions, candidate.domain_id, properties))
+            self.permissions_token = access.get_permissions_token(self.permissions)
+            authentication.set_permissions_credential_and_token(
+                self.identity, access.get_permissions_credential_token(self.permissions), self.permissions_token
+            )
+            self.attributes = access.get_participant_sec_attributes(self.permissions)
+            self.info = participant_info(self.attributes)
+            self.crypto = plugins.cryptographic.register_local_participant(
+                self.identity, self.permissions, properties, self.attributes
+            )
+            undo.callback(plugins.cryptographic.unregister_participant, self.crypto)
+            self.endpoints: dict[Guid, LocalEndpoint] = {}
+            self._register_builtin_endpoints()
+            self._undo = undo.pop_all()
+
+    def close(self) -> None:
+        """Give back keys, permissions and identity, in this order, as each was derived from the next."""
+        self.endpoints.clear()
+        self._undo.close()
 
     def announcement(self) -> Announcement:
         authentication = self._plugins.authentication

@@ -146,6 +146,16 @@ class SecurityService:
             self._keys.endpoint_deleted(endpoint)
             self._protection.changed()
 
+    def local_participant_deleted(self) -> None:
+        self._desk.close()
+        for endpoint in self._own.endpoints.values():
+            self._keys.endpoint_deleted(endpoint)
+        self._own.close()
+        self._protection.changed()
+        self._plugins.logging.set_listener(None)
+        self._effects.clear()
+        self._deadline = self._wall_due = math.inf
+
     def on_log_message(self, event: BuiltinLoggingTypeV2) -> None:
         """The logging plugin wants an event published (§8.6.2)."""
         payload = serialize(event, representation=DataRepresentationId.XCDR1)

@@ -164,10 +164,14 @@ class Participant:
         self.liveliness = Liveliness(self)
         self.timeliness = Timeliness(self)
         self.admission = AdmissionDesk(self)
-        self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
         self.builtin_readers = BuiltinTopicReaders(self)
-        self.builtin = BuiltinTopics(self)
-        self.builtin.create(self.discovery.data.builtin_endpoints)
+        try:
+            self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
+            self.builtin = BuiltinTopics(self)
+            self.builtin.create(self.discovery.data.builtin_endpoints)
+        except BaseException:  # what we would say of ourselves cannot be written, say
+            hooks.local_participant_deleted()
+            raise
 
     # --- the four calls ----------------------------------------------------------------------------------
 
@@ -194,8 +198,9 @@ class Participant:
     def handle_timeout(self, now: float) -> None:
         """Run every timer that is due."""
         self.now = now
-        if not self._is_closed:
-            self.alarms.run_due(now)
+        if self._is_closed:
+            return
+        self.alarms.run_due(now)
         if self.builtin.waiting:
             self.builtin.process_waiting(now)
 
@@ -387,7 +392,9 @@ class Participant:
             self.delete_reader(reader, now)
         self.outbound.flush()
         self.discovery.say_goodbye(now)
+        self.flush()
         self._is_closed = True
+        self.hooks.local_participant_deleted()  # the effects that are left hold octets that are protected already
         self.recorder.closed()
 
     def user_writers(self, topic_name: str | None = None) -> list[LocalWriter]:

@@ -156,7 +156,7 @@ class SecurityHooks(Protocol):
     def local_participant(self, candidate: LocalParticipant) -> Guid:
         """The Guid to use, adjusted to the identity (DDS-Security 1.1 §8.3.2.11.2, validate_local_identity).
 
-        Called once, before anything is sent.  Raises NotAllowedBySecurity or ConfigurationError.
+        Called once, before anything is sent.  Raises NotAllowedBySecurity or ConfigurationError; nothing is kept then.
         """
         ...
 
@@ -206,14 +206,22 @@ class SecurityHooks(Protocol):
         """May the local endpoint match the remote one (§8.4.2.9.10-11, §8.5.1.7.3-6)?  PENDING: keys are under way.
 
         Asked for pairs of builtin endpoints too, but SPDP's.  Before a participant is admitted only its
-        ParticipantStatelessMessage endpoints are asked about.  Asked again of a pair that is pending, was refused, or is
-        matched, when one of the two has changed; a matched one stays so unless it is refused.
+        ParticipantStatelessMessage endpoints are asked about.  Asked again of a pair that is pending, was refused, or
+        is matched, when one of the two has changed; a matched one stays so unless it is refused.
         """
         ...
 
     def unmatch(self, local: Guid, remote: Guid) -> None:
         """A pair of the application's endpoints that was admitted, or pending, is one no more.  Builtin pairs end with
         :meth:`remote_participant_lost`."""
+        ...
+
+    def local_participant_deleted(self) -> None:
+        """Our participant is no more, or could not be made: identity and permissions are returned, keys wiped.
+
+        Called once, when the last message has been protected; nothing is asked afterwards.  §8.5.1.7.7
+        (unregister_participant), §8.3.2.11.17 (return_identity_handle).
+        """
         ...
 
     # --- what applications may know ------------------------------------------------------------------------

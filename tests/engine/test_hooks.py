@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION
-from ddsi.engine import LocalReader, LocalWriter, StatusChanged
+from ddsi.engine import LocalReader, LocalWriter, SendDatagram, StatusChanged
 from ddsi.engine.outbound import fragment_octets_for
 from ddsi.simulation import Domain, Node, invariants
 from ddsi.spi import (
@@ -74,6 +74,9 @@ class Hooks(Plaintext):
     def local_endpoint_deleted(self, guid: Guid) -> None:
         self.asked.append("local_endpoint_deleted")
 
+    def local_participant_deleted(self) -> None:
+        self.asked.append("local_participant_deleted")
+
     def announcement(self) -> Announcement:
         self.asked.append("announcement")
         return super().announcement()
@@ -125,6 +128,44 @@ def test_the_moments_of_a_life_are_asked_in_order() -> None:
         "match DCPSParticipantMessage", "match DCPSParticipantMessage",
         "match", "unmatch", "local_endpoint_deleted", "remote_participant_lost",
     ]  # fmt: skip
+
+
+def test_the_end_is_told_once_behind_the_last_message_and_nothing_is_asked_after_it() -> None:
+    class Counting(Hooks):
+        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+            self.asked.append("encode_message")
+            return super().encode_message(receivers, message)
+
+        def drain_effects(self) -> Sequence[HookEffect]:
+            self.asked.append("drain_effects")
+            return super().drain_effects()
+
+    domain, a, b, hooks = pair(Counting)
+    a.reader("Square", RELIABLE)
+    writer = b.writer("Square", RELIABLE)
+    domain.run_until(domain.all_matched, 1)
+    writer.write()
+    hooks.asked.clear()
+    b.engine.close(b.now)
+    assert hooks.asked[-1] == "local_participant_deleted"
+    assert "encode_message" in hooks.asked  # "endpoint gone", for one
+    told = len(hooks.asked)
+    assert any(isinstance(effect, SendDatagram) for effect in b.engine.drain_effects())
+    b.engine.handle_timeout(b.now + 10)
+    b.engine.close(b.now + 10)
+    assert b.engine.drain_effects() == []
+    assert len(hooks.asked) == told
+
+
+def test_the_end_is_told_when_a_participant_cannot_be_made() -> None:
+    class Failing(Hooks):
+        def announced(self, parameters: bytes) -> None:
+            raise OSError("no space left")
+
+    hooks = Failing()
+    with pytest.raises(OSError, match="no space left"):
+        pair(lambda: hooks)
+    assert hooks.asked == ["local_participant", "announcement", "local_participant_deleted"]
 
 
 def test_a_local_participant_may_be_refused() -> None:

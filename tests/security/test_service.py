@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import math
 from dataclasses import replace
 from random import Random
 
@@ -29,6 +31,11 @@ from ddsi.structure.guid import EntityId, EntityKind, Guid
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import Property
 from ddsi_security import service
+from ddsi_security.authentication.handshake import Handshake
+from ddsi_security.authentication.not_trusted import NotTrusted
+from ddsi_security.authentication.signatures import SoftwareKey
+from ddsi_security.cryptographic.key_material import KeyMaterial
+from ddsi_security.cryptographic.session_keys import ReceiverKey
 from ddsi_security.generic_message import (
     AUTH_REQUEST,
     GenericMessage,
@@ -36,10 +43,11 @@ from ddsi_security.generic_message import (
     read_generic_message,
     write_generic_message,
 )
+from ddsi_security.handles import SharedSecretHandle
 from ddsi_security.local_endpoint import BUILTIN_SECURE_TOPICS
 from ddsi_security.tokens import DataHolder
 
-from .seam import NOW_NS, Side, deliver, introduce, match_builtin_topics, properties_of
+from .seam import KEYSTORE, NOW_NS, Side, deliver, introduce, match_builtin_topics, properties_of
 
 USER_WRITER = EntityId.user(1, EntityKind.WRITER_WITH_KEY)
 USER_READER = EntityId.user(2, EntityKind.READER_WITH_KEY)
@@ -433,6 +441,58 @@ def test_what_expires_is_taken_out_as_an_event() -> None:
     assert isinstance(refusal, Refused)
     assert "ended at 2036-11-19T" in refusal.reason
     assert isinstance(alice.hooks.remote_participant(bob.data, 1.0), Refused), "nor is it asked again"
+
+
+# --- the end --------------------------------------------------------------------------------------------------------
+
+
+def alive(*kinds: type) -> dict[int, object]:
+    return {id(found): found for found in gc.get_objects() if isinstance(found, kinds)}
+
+
+@pytest.mark.parametrize("governance", GOVERNANCES)
+def test_no_key_outlives_its_participant(governance: str) -> None:
+    kinds = (KeyMaterial, ReceiverKey, SharedSecretHandle, Handshake, SoftwareKey)
+    before = alive(*kinds)
+    alice, bob = trusting_pair(governance)
+    alice.hooks.local_writer(writer_data(alice))
+    bob.hooks.local_reader(reader_data(bob))
+    bob.match(USER_READER, alice, USER_WRITER, "Square")
+    alice.match(USER_WRITER, bob, USER_READER, "Square")
+    deliver(alice, bob)
+    made = [found for name, found in alive(*kinds).items() if name not in before]
+    assert {type(found) for found in made} >= {KeyMaterial, SharedSecretHandle, SoftwareKey}
+    for side in (alice, bob):
+        side.hooks.local_participant_deleted()
+        assert side.hooks.drain_effects() == ()
+        assert side.hooks.next_deadline() == math.inf
+    for found in made:
+        match found:
+            case KeyMaterial():
+                assert not any(found.master_sender_key), found
+                assert not any(found.master_salt), found
+                assert not any(found.master_receiver_specific_key), found
+            case ReceiverKey():
+                assert not any(found._master), found
+            case SharedSecretHandle():
+                assert found.shared_secret == b""
+            case Handshake():
+                assert not getattr(found, "secret", b"")
+            case SoftwareKey():
+                with pytest.raises(NotTrusted, match="returned"):
+                    found.sign(b"")
+
+
+def test_a_participant_that_cannot_be_made_keeps_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    returned: list[SoftwareKey] = []
+
+    def close(key: SoftwareKey) -> None:
+        returned.append(key)
+
+    monkeypatch.setattr(SoftwareKey, "close", close)
+    with pytest.raises(ConfigurationError, match="grant"):
+        Side("alice", extra={"dds.sec.access.permissions": f"file:{KEYSTORE}/bob.permissions.p7s"})
+    assert len(returned) == 1
 
 
 # --- the factory ----------------------------------------------------------------------------------------------------
