@@ -81,7 +81,7 @@ async def _join(options: ShapeMainOptions, end: trio.Event) -> ShapeMainStatus:
         config = participant_config(options, load_config(options.domain))
         async with DomainParticipant(options.domain, config=config) as participant:
             return await _play_role(options, end, participant)
-    except DdsError as error:
+    except (DdsError, OSError) as error:
         print(f"failed to create participant: {error}")
         return ShapeMainStatus.INITIALIZING
 
