@@ -51,17 +51,18 @@ _PRIMITIVES = {"float32": "float", "float64": "double"}
 
 def idl_text(type_: _Named) -> str:
     """The IDL of a type and of what it needs.  BadParameter where its names are none in IDL, or collide."""
-    order, recursive = _in_order(type_)
+    order = _in_order(type_)
     writer = _Writer(order)
     blocks: list[_Block] = []
-    announced: set[int] = set()
-    for index, named in enumerate(order):
-        for forward in recursive.get(id(named), []):
-            if id(forward) not in announced and forward in order[index:]:
-                announced.add(id(forward))
-                kind = "struct" if isinstance(forward, StructType) else "union"
-                blocks.append((_module(forward), [f"{kind} {_escaped(_path(forward)[-1])};"]))
+    known: set[int] = set()
+    for named in order:
+        for need, _ in _needs(named):
+            if id(need) not in known and isinstance(need, (StructType, UnionType)):  # it comes later, or is this one
+                kind = "struct" if isinstance(need, StructType) else "union"
+                blocks.append((_module(need), [f"{kind} {_escaped(_path(need)[-1])};"]))
+                known.add(id(need))
         blocks += writer.definition(named)
+        known.add(id(named))
     return "".join(_modules(blocks))
 
 
@@ -90,49 +91,62 @@ def _closing(opened: tuple[str, ...], shared: int) -> Iterator[str]:
 # --- the order ---------------------------------------------------------------------------------------------
 
 
-def _in_order(root: _Named) -> tuple[list[_Named], dict[int, list[Composite]]]:
-    """(types, each behind what it needs; for a type, by id, those that it names and that come behind it)."""
+def _in_order(root: _Named) -> list[_Named]:
+    """All types, each behind those that must be complete before it, and if that can be behind all that it needs."""
+    remaining = _needs_first(root)
     order: list[_Named] = []
-    state: dict[int, bool] = {}
-    """False while a type waits for what it needs, True when it has its place."""
-    recursive: dict[int, list[Composite]] = {}
-    pending: list[tuple[_Named, Iterator[_Named]]] = [(root, iter(_needs(root)))]
-    state[id(root)] = False
+    done: set[int] = set()
+    while remaining:
+        ready = next((type_ for type_ in remaining if all(id(need) in done for need, _ in _needs(type_))), None)
+        if ready is None:  # some name each other; what may be announced need not be there
+            ready = next((type_ for type_ in remaining if _is_ready(type_, done)), remaining[0])
+        remaining.remove(ready)
+        order.append(ready)
+        done.add(id(ready))
+    return order
+
+
+def _is_ready(type_: _Named, done: set[int]) -> bool:
+    return all(id(need) in done or not is_by_value for need, is_by_value in _needs(type_))
+
+
+def _needs_first(root: _Named) -> list[_Named]:
+    """All types, each behind what it needs, but for those that name each other."""
+    found: list[_Named] = []
+    seen = {id(root)}
+    pending = [(root, iter(_needs(root)))]
     while pending:
         type_, needs = pending[-1]
-        needed = next(needs, None)
-        if needed is None:
-            order.append(type_)
-            state[id(type_)] = True
+        need, _ = next(needs, (None, False))
+        if need is None:
+            found.append(type_)
             pending.pop()
-        elif id(needed) not in state:
-            state[id(needed)] = False
-            pending.append((needed, iter(_needs(needed))))
-        elif not state[id(needed)] and isinstance(needed, (StructType, UnionType)):
-            recursive.setdefault(id(type_), []).append(needed)
-    return order, recursive
-
-
-def _needs(type_: _Named) -> list[_Named]:
-    found: list[_Named] = []
-    if isinstance(type_, BitsetType):
-        found += [type_.base] if type_.base is not None else []
-    elif isinstance(type_, StructType):
-        found += [type_.base] if type_.base is not None else []
-        for member in type_.declared:
-            found += _named(member.type)
-    elif isinstance(type_, UnionType):
-        for member in type_.members:
-            found += _named(member.type)
+        elif id(need) not in seen:
+            seen.add(id(need))
+            pending.append((need, iter(_needs(need))))
     return found
 
 
-def _named(type_: IdlType) -> list[_Named]:
+def _needs(type_: _Named) -> list[tuple[_Named, bool]]:
+    """The types that a type names, and whether each must be complete before it."""
+    found: list[tuple[_Named, bool]] = []
+    if isinstance(type_, (BitsetType, StructType)) and type_.base is not None:
+        found.append((type_.base, True))
+    if isinstance(type_, (StructType, UnionType)):
+        for member in type_.declared if isinstance(type_, StructType) else type_.members:
+            found += _named(member.type, is_by_value=not member.is_optional)
+    return found
+
+
+def _named(type_: IdlType, *, is_by_value: bool) -> list[tuple[_Named, bool]]:
     while isinstance(type_, (SequenceType, ArrayType)):
+        is_by_value = is_by_value and isinstance(type_, ArrayType)
         type_ = type_.element
     if isinstance(type_, MapType):
-        return [*_named(type_.key), *_named(type_.value)]
-    return [] if isinstance(type_, (Primitive, String)) else [type_]
+        return [*_named(type_.key, is_by_value=False), *_named(type_.value, is_by_value=False)]
+    if isinstance(type_, (Primitive, String)):
+        return []
+    return [(type_, is_by_value or not isinstance(type_, (StructType, UnionType)))]
 
 
 # --- names -------------------------------------------------------------------------------------------------

@@ -169,6 +169,27 @@ def test_typedefs_survive() -> None:
         assert line in text.splitlines()
 
 
+RECURSIVE = """
+struct Derived;
+struct Holder;
+struct Base { sequence<Derived> below; sequence<Holder> holders; };
+struct Derived : Base { long x; };
+struct Holder { Base base; Derived derived[2]; };
+struct Node { long x; };
+union Leafy;
+struct Branch { sequence<Leafy> leaves; @optional Branch next; map<string, Leafy> named; };
+union Leafy switch (boolean) { case TRUE: Branch branch; case FALSE: Node leaf; };
+"""
+
+
+@pytest.mark.parametrize("name", ["Base", "Derived", "Holder", "Branch", "Leafy"])
+def test_types_that_name_each_other_survive(name: str) -> None:
+    """Whichever comes first: a base and what is held by value must be complete, the others are announced."""
+    type_ = named_type(getattr(idl.loads(RECURSIVE), name))
+    again = idl.loads(idl.to_idl(type_.python_class))
+    assert difference(type_, named_type(getattr(again, name))) == ""
+
+
 def test_an_alias_whose_name_is_taken_is_left_out() -> None:
     @idl.struct(typename="Taken")
     class Taken:
