@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterator
 
 from ddsi.messages.interpreter import InfoDestination
 from ddsi.serialization import ParameterId
+from ddsi.xtypes.type_object import TypeIdentifier, encode_identifier
+from ddsi.xtypes.type_object.identifiers import MapIdentifier, PrimitiveIdentifier, SequenceIdentifier
+from ddsi.xtypes.type_object.kinds import TypeKind
 from tests.engine.wire import Stranger, engine
 
 __all__ = ["MESSAGE_MAKERS", "Made"]
@@ -206,6 +209,47 @@ def samples() -> Iterator[Made]:
     yield "delimiter-of-4-gigabytes", longer, "MalformedSample"
 
 
+# --- types of peers -----------------------------------------------------------------------------------------------
+
+
+def type_objects() -> Iterator[Made]:
+    """The first octet says what follows: 0 an identifier, 2 a TypeObject, 4 a TypeInformation; 1 more: big endian."""
+
+    def framed(body: bytes, length: int | None = None) -> bytes:
+        return struct.pack("<I", len(body) if length is None else length) + body
+
+    def struct_object(members: bytes) -> bytes:
+        return b"\2" + framed(b"\xf1\x51\1\0" + framed(bytes(4)) + framed(members))
+
+    sequence: TypeIdentifier = PrimitiveIdentifier(TypeKind.INT32)
+    map_ = sequence
+    for _ in range(150):
+        sequence, map_ = SequenceIdentifier(sequence), MapIdentifier(map_, PrimitiveIdentifier(TypeKind.INT32))
+    yield "nothing", b"", MALFORMED
+    yield "nested-sequences", b"\0" + encode_identifier(sequence), MALFORMED + " ~ deeper"
+    yield "nested-map-keys", b"\0" + encode_identifier(map_), MALFORMED + " ~ deeper"
+    yield "array-of-4294967295-dimensions", b"\0\x91\xf3\1\0" + U32_MAX, MALFORMED + " ~ sequence of 4294967295"
+    yield "array-of-70000-dimensions", b"\0\x90\xf3\1\0" + struct.pack("<I", 70_000), MALFORMED + " ~ no type has"
+    yield "component-index-0", b"\0\xb0\0\0\0" + framed(b"\xf1" + bytes(23)), MALFORMED + " ~ type 0"
+    yield "component-of-a-primitive", b"\0\xb0\0\0\0" + framed(b"\4" + bytes(23)), MALFORMED + " ~ component"
+    yield "unknown-identifier-of-2-gibibytes", b"\0\xc7\0\0\0" + struct.pack("<I", 1 << 31), MALFORMED
+    yield "object-without-kind", b"\2" + framed(b"\xf3\x51"), MALFORMED + " ~ kind 0xf3"
+    yield "object-of-an-annotation", b"\2" + framed(b"\xf1\x50"), MALFORMED + " ~ kind 0x50"
+    yield "object-longer-than-all", b"\2" + framed(b"\xf1\x51", 0xFFFFFFFC), MALFORMED
+    yield "members-beyond-the-end", struct_object(struct.pack("<I", 65_535) + bytes(24)), MALFORMED + " ~ 65535"
+    yield "members-of-no-octets", struct_object(struct.pack("<I", 200) + bytes(1600)), MALFORMED
+    yield "member-longer-than-its-sequence", struct_object(struct.pack("<II", 1, 999) + bytes(24)), MALFORMED
+    alias = b"\xf2\x30\0\0" + framed(bytes(4) + framed(b"A\x1b[31m\0")[:12] + bytes(1)) + bytes(3) + framed(bytes(5))
+    yield "name-with-escapes", b"\2" + framed(alias), MALFORMED + " ~ name"
+    yield "information-empty", b"\4" + framed(b""), "accepted"
+    yield "information-endless", b"\4" + framed(b"\1\x10\0\x40" * 200), MALFORMED
+    skipped = struct.pack("<II", 7 << 28 | 5, 1 << 30)
+    yield "information-with-a-member-of-8-gibibytes", b"\4" + framed(skipped), MALFORMED
+    many = bytes(4) + struct.pack("<i", 100) + framed(struct.pack("<I", 100) + bytes(64))
+    half = framed(framed(framed(bytes(8)) + many))
+    yield "dependencies-beyond-the-end", b"\4" + framed(b"\1\x10\0\x40" + half), MALFORMED
+
+
 MESSAGE_MAKERS: dict[str, Callable[[], Iterator[Made]]] = {
     "datagram": datagrams,
     "conversation": conversations,
@@ -214,4 +258,5 @@ MESSAGE_MAKERS: dict[str, Callable[[], Iterator[Made]]] = {
     "sedp_reader": sedp_reader,
     "participant_message": participant_messages,
     "sample": samples,
+    "type_object": type_objects,
 }

@@ -25,9 +25,11 @@ from ddsi.structure.qos import Qos, reader_qos, writer_qos
 from ddsi.structure.qos_policies import KeepAll, Reliable, TransientLocal
 from ddsi.structure.vendor import CYCLONE
 from ddsi.xtypes import type_support
+from ddsi.xtypes.type_object import decode_identifier, decode_type_information, decode_type_object
 from tests.captures.capture import PLAIN, load
 from tests.engine.wire import VENDOR, Stranger, engine
 from tests.fuzz.target import ACCEPTED, Target, verdict
+from tests.xtypes.type_object.vectors import VECTORS as TYPE_OBJECTS
 from tests.xtypes.vector_types import TYPES
 from tests.xtypes.vectors import VECTORS
 
@@ -166,6 +168,26 @@ def samples() -> Iterator[bytes]:
                 yield bytes([index]) + octets
 
 
+# --- types of peers -----------------------------------------------------------------------------------------------
+
+
+def type_object(octets: bytes) -> str:
+    """An identifier, a TypeObject or a TypeInformation, by the first octet, in either byte order."""
+    kind = octets[0] if octets else 0
+    decode = (decode_identifier, decode_type_object, decode_type_information)[kind // 2 % 3]
+    return verdict(lambda: decode(octets[1:], little_endian=not kind & 1), MalformedMessage)
+
+
+def type_objects() -> Iterator[bytes]:
+    """What a real peer made of its types."""
+    for vector in TYPE_OBJECTS:
+        yield b"\0" + bytes.fromhex(vector["type_identifier_minimal"])
+        yield b"\4" + bytes.fromhex(vector["type_information"])
+        for kind in "minimal", "complete":
+            for octets in vector.get(f"type_objects_{kind}", {}).values():
+                yield b"\2" + bytes.fromhex(octets)
+
+
 PLAIN_TARGETS = {
     "datagram": Target(datagram, captured_datagrams, 2048, enormous=60_000),
     "conversation": Target(conversation, conversations, 4096, enormous=60_000, good="dropped"),
@@ -174,4 +196,5 @@ PLAIN_TARGETS = {
     "sedp_reader": Target(sedp_reader, lambda: captured_payloads(ids.SEDP_SUBSCRIPTIONS_WRITER), 2048),
     "participant_message": Target(participant_message, lambda: captured_payloads(ids.PARTICIPANT_MESSAGE_WRITER), 512),
     "sample": Target(sample, samples, 512),
+    "type_object": Target(type_object, type_objects, 1024),
 }

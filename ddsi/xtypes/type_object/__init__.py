@@ -4,7 +4,9 @@
 """
 
 from .builder import BuiltTypes
+from .decoding import decode_type_object
 from .description import TypeDescription, describe
+from .encoding import encode_type_object, equivalence_hash
 from .identifiers import (
     ComponentIdentifier,
     HashedIdentifier,
@@ -27,6 +29,9 @@ __all__ = [
     "TypeObject",
     "decode_identifier",
     "decode_type_information",
+    "decode_type_object",
     "describe",
     "encode_identifier",
+    "encode_type_object",
+    "equivalence_hash",
 ]

@@ -13,6 +13,10 @@ from ...serialization.cursor import Reader, Writer
 __all__ = ["ObjectReader", "ObjectWriter"]
 
 
+MOST_ELEMENTS = 1 << 16
+"""Members, literals, labels or dimensions that are read of a peer's type."""
+
+
 class ObjectWriter(Writer):
     """Writes XCDR2, little endian, as hashes are computed."""
 
@@ -69,6 +73,8 @@ class ObjectReader(Reader):
     def count(self, *, least_octets: int) -> int:
         """The number of elements of a sequence; there must be room for them, each of ``least_octets`` or more."""
         count = self.u32()
+        if count > MOST_ELEMENTS:
+            raise self.malformed(f"a sequence of {count} elements; no type has more than {MOST_ELEMENTS} of anything")
         if count * least_octets > self.remaining:
             raise self.malformed(f"a sequence of {count} elements in {self.remaining} octets")
         return count
