@@ -50,7 +50,7 @@ class DropReason(StrEnum):
     UNMATCHED = "unmatched"
     """Both endpoints are known, but they are not matched."""
     NOT_FOR_US = "not_for_us"
-    """INFO_DST names another participant, or only another holds the key.  Normal under multicast."""
+    """INFO_DST names another participant, or only others hold the keys, or can verify it.  Normal under multicast."""
 
     # Its place in the order.
     STALE_COUNT = "stale_count"

@@ -13,7 +13,7 @@ from typing import Final
 from cryptography.exceptions import InvalidTag
 
 from ddsi.messages.raw_submessage import SubmessageKind
-from ddsi.spi import Octets, Outcome, Rejected
+from ddsi.spi import NOT_FOR_US, Octets, Outcome, Rejected
 from ddsi.structure.errors import MalformedMessage
 
 from .aes_gcm import LARGE, decrypt_joined
@@ -131,8 +131,10 @@ def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: 
                 continue
         if expected is not None and expected.origin_authenticated:
             receiver_mac = _find_receiver_mac(octets, macs_at, end, key.receiver_key_id)
-            if session.receiver_aead is None or receiver_mac is None:
-                return Rejected("it bears no MAC for us")
+            if session.receiver_aead is None or macs_at == end:
+                return Rejected("nothing proves to us where it comes from")
+            if receiver_mac is None:
+                return NOT_FOR_US  # it proves it to others, whom alone it is for
             if not compare_digest(session.receiver_aead.encrypt(nonce, b"", mac), receiver_mac):
                 return Rejected("the MAC for us is wrong")
         if session_id not in key.sessions:

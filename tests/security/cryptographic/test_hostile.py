@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddsi.spi import NoKeys, Octets, Outcome, Rejected
+from ddsi.spi import NOT_FOR_US, NoKeys, NotForUs, Octets, Outcome, Rejected
 from ddsi_security.cryptographic import opening, payload
 from ddsi_security.cryptographic.aes_gcm import LARGE
 from ddsi_security.cryptographic.envelope import SUBMESSAGE
@@ -86,7 +86,9 @@ def test_a_flipped_bit_is_noticed_or_changes_nothing(octets: bytes, open_it: Ope
             flipped = bytearray(octets)
             flipped[at] ^= 1 << bit
             found = open_it(bytes(flipped))
-            if isinstance(found, Outcome):
+            if found is NOT_FOR_US:  # whose the last MAC is, was changed
+                assert len(octets) - 20 <= at < len(octets) - 16
+            elif isinstance(found, Outcome):
                 assert isinstance(found, Rejected | NoKeys)
             else:
                 assert found == plain
@@ -131,7 +133,7 @@ def test_any_octets_have_an_outcome(octets: bytes, open_it: Opener, plain: bytes
         end = min(start + data.draw(st.integers(0, 24)), len(mutant))
         mutant[start:end] = data.draw(st.binary(max_size=24) | st.just(bytes(mutant[start:end] * 2)))
     found = open_it(bytes(mutant))
-    assert isinstance(found, Rejected | NoKeys) or found == plain
+    assert isinstance(found, Rejected | NoKeys | NotForUs) or found == plain
 
 
 @given(data=st.data())
@@ -439,7 +441,7 @@ def test_a_signed_message_holds_protected_submessages() -> None:
 
 
 @pytest.mark.parametrize("kind", [GCM, GMAC])
-def test_without_a_mac_for_us_it_is_rejected(kind: TransformationKind) -> None:
+def test_without_any_mac_it_is_rejected(kind: TransformationKind) -> None:
     open_it = opener(opening.open_submessage, kind, origin=True)
     buffer = bytearray()
     assert seal_submessage(buffer, vectors.HEARTBEAT, sending_key(material(kind)), []) is None
@@ -459,8 +461,19 @@ def test_ours_is_found_among_many_and_the_first_counts() -> None:
     others = [random.Random(number).randbytes(20) for number in range(500)]
     assert open_it(with_macs(ours)) == vectors.HEARTBEAT
     assert open_it(with_macs(*others, ours)) == vectors.HEARTBEAT
-    assert isinstance(open_it(with_macs(*others)), Rejected)
+    assert open_it(with_macs(*others)) is NOT_FOR_US
     assert isinstance(open_it(with_macs(ours[:4] + bytes(16), ours)), Rejected)
+
+
+def test_what_is_for_others_only_is_so_by_its_common_mac() -> None:
+    """Whoever has no key at all cannot make us believe that something was meant for somebody else."""
+    open_it = opener(opening.open_submessage, GCM, origin=True)
+    genuine = vectors.HEARTBEAT_ENCRYPTED_FOR_ONE
+    for_others = genuine[:-20] + b"else" + genuine[-16:]
+    assert open_it(for_others) is NOT_FOR_US
+    forged = bytearray(for_others)
+    forged[68] ^= 1
+    assert open_it(bytes(forged)) == Rejected("the common MAC is wrong")
 
 
 def test_a_key_without_receivers_key_cannot_authenticate_the_origin() -> None:
