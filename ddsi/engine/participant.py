@@ -594,7 +594,8 @@ class Participant:
         self.recorder.samples_lost(reader.guid, writer, number, number, SampleLossReason.MALFORMED_SAMPLE, detail)
 
     def _sample_rejected(self, guid: Guid, reason: str) -> None:
-        self.drops[DropReason.READER_FULL] += 1
+        is_by_instances = reason == "max_instances"
+        self.dropped(DropReason.TABLE_FULL_INSTANCES if is_by_instances else DropReason.READER_FULL, None, reason)
         self.status(guid, self.local_readers[guid].sample_rejected(reason))
 
     def send_spdp(self, submessage: bytes, destinations: tuple[Locator, ...]) -> None:

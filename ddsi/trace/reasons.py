@@ -76,7 +76,7 @@ class DropReason(StrEnum):
     OVERLOADED_MESSAGE = "overloaded_message"
     """One message asks for more work than any honest one: numbers by the thousand, participants by the dozen."""
     RATE_LIMITED = "rate_limited"
-    """Answering would amplify: the peer has used up what we send to an address that has not proved itself."""
+    """Answering would amplify: it was answered a moment ago, or nothing more goes to who has not proved himself."""
     QUEUE_FULL = "queue_full"
     """The operating system, or our own queue to it, took no more."""
 

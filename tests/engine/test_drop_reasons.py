@@ -10,15 +10,18 @@ from ddsi.messages.data_frag import DataFrag
 from ddsi.messages.gap import Gap
 from ddsi.messages.heartbeat import Heartbeat
 from ddsi.messages.interpreter import InfoDestination, InfoReply, Pad
+from ddsi.simulation.endpoints import SIMULATED_KEYS
 from ddsi.structure.builtin_entity_ids import (
     PARTICIPANT_STATELESS_MESSAGE_READER,
     PARTICIPANT_STATELESS_MESSAGE_WRITER,
 )
 from ddsi.structure.guid import EntityId, GuidPrefix
+from ddsi.structure.qos import Qos, reader_qos
+from ddsi.structure.qos_policies import BestEffort, KeepAll, ResourceLimits
 from ddsi.structure.sequence_number import NumberSet
 from ddsi.trace.reasons import DropReason as Reason
 from ddsi.trace.sink import MemorySink
-from tests.engine.wire import Stranger
+from tests.engine.wire import Stranger, engine
 from tests.engine.worst import OUR_WRITER, READER, WRITER, listener
 from tests.fuzz.session import Session
 
@@ -82,6 +85,24 @@ def test_a_buffer_that_is_full_is_counted() -> None:
     for number in range(2, most + 12):
         participant.receive_datagram(Stranger().message(data(number)), Stranger().address, 1.0)
     assert participant.drops == {Reason.TABLE_FULL_REORDER: 10}
+
+
+@pytest.mark.parametrize(
+    ("limits", "reason"),
+    [
+        (ResourceLimits(max_instances=1), Reason.TABLE_FULL_INSTANCES),
+        (ResourceLimits(max_samples=1), Reason.READER_FULL),
+    ],
+)
+def test_a_best_effort_reader_that_is_full_is_counted(limits: ResourceLimits, reason: Reason) -> None:
+    participant, stranger = engine(), Stranger()
+    qos = Qos(reliability=BestEffort(), history=KeepAll(), resource_limits=limits)
+    participant.create_reader("In", "T", reader_qos(qos), 0.0, is_keyed=False, keys=SIMULATED_KEYS)
+    stranger.introduce(participant)
+    participant.receive_datagram(stranger.sedp_writer(1, "In"), stranger.address, 0.0)
+    samples = [Data(ALL, WRITER, number, None, b"\0\1\0\0" + bytes([number, 0, 0, 0])).encode() for number in (1, 2)]
+    participant.receive_datagram(stranger.message(*samples), stranger.address, 1.0)
+    assert participant.drops == {reason: 1}
 
 
 def test_a_trace_says_whose_it_was() -> None:
