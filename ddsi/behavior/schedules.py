@@ -28,7 +28,7 @@ _MAX_TIMED = 512  # how many numbers under way are timed
 
 def heartbeat_period(unanswered: int) -> float:
     """Seconds until the next HEARTBEAT when so many were left unanswered: doubled after every third."""
-    return min(HEARTBEAT_PERIOD_MIN * 2 ** min(unanswered // HEARTBEATS_BEFORE_BACKOFF, 16), HEARTBEAT_PERIOD_MAX)
+    return min(HEARTBEAT_PERIOD_MIN * (1 << min(unanswered // HEARTBEATS_BEFORE_BACKOFF, 16)), HEARTBEAT_PERIOD_MAX)
 
 
 class HeartbeatSchedule:
