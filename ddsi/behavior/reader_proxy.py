@@ -110,8 +110,8 @@ class ReaderProxy:
     def asked(self, now: float) -> None:
         """A periodic HEARTBEAT wants its answer: the more of them it leaves unanswered, the longer the next one waits.
 
-        Each reader for itself.  In a crowd somebody acknowledges all the time, and keeps the writer's own schedule at its
-        quickest; if each time all others were asked too, those who are behind would drown in questions.
+        Each reader for itself.  In a crowd somebody acknowledges all the time, and keeps the writer's own schedule at
+        its quickest; if each time all others were asked too, those who are behind would drown in questions.
         """
         self._unanswered += 1
         self.heartbeat_due = now + heartbeat_period(self._unanswered)
