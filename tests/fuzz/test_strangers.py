@@ -6,7 +6,7 @@ import tracemalloc
 
 import pytest
 
-from tests.fuzz.strangers import Flood, tables
+from tests.fuzz.strangers import Flood, main, tables
 
 MOST_GROWTH = 3 << 20
 """Octets; the tables are full long before half of a flood is over."""
@@ -57,3 +57,17 @@ def test_the_same_seed_makes_the_same_flood() -> None:
     assert one.secured.engine.drops == other.secured.engine.drops
     assert tables(one.plain.engine) == tables(other.plain.engine)
     assert (one.octets, one.octets_sent()) == (other.octets, other.octets_sent())
+
+
+def test_the_command_prints_tables_memory_and_drops(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--datagrams", "200", "--seed", "3"])
+    said = capsys.readouterr().out
+    for words in (
+        "KiB resident",
+        "without security",
+        "secured",
+        "participants",
+        "dropped: ",
+        "the friend is served: True",
+    ):
+        assert words in said
