@@ -47,6 +47,9 @@ from .syntax import (
 
 __all__ = ["analyze"]
 
+MOST_LINKS = 100
+"""Typedefs of typedefs.  In Python each remembers the whole chain."""
+
 
 def analyze(
     definitions: Sequence[Definition], place: Place, *, default_extensibility: Extensibility, warnings: list[IdlWarning]
@@ -122,6 +125,8 @@ class _Analysis(CompositeAnalysis):
         known = self.scope.members.get(node.name)
         if isinstance(known, Alias) and known.type == type_:
             return  # the same typedef again says nothing new
+        if alias.links > MOST_LINKS:
+            raise IdlError(node.place, f"typedefs follow each other through more than {MOST_LINKS}")
         self.add(alias)
 
     # --- enums, bitmasks, bitsets ------------------------------------------------------------------------
@@ -183,10 +188,11 @@ class _Analysis(CompositeAnalysis):
     def _bitset(self, node: BitsetNode) -> None:
         base: BitsetDeclaration | None = None
         if node.base is not None:
-            found = unaliased_declaration(look_up(node.base, self.scope))
-            if not isinstance(found, BitsetDeclaration):
+            found = look_up(node.base, self.scope)
+            bare = unaliased(found) if isinstance(found, Alias) else found
+            if not isinstance(bare, BitsetDeclaration):
                 raise IdlError(node.base.place, f"expected a bitset as base; {node.base} is none")
-            base = found
+            base = bare
         Annotations(node.annotations, self.lookup, self.warnings).warn_of_the_rest()
         bitset = BitsetDeclaration(self.path(node.name), node.place, node.comment, base=base)
         position = base.end if base is not None else 0
@@ -233,7 +239,3 @@ class _Analysis(CompositeAnalysis):
         for use, composite in self.incomplete_uses:
             if not composite.is_defined:
                 raise IdlError(use, f"{composite.scoped_name} is declared, but never defined")
-
-
-def unaliased_declaration(found: object) -> object:
-    return unaliased(found) if isinstance(found, Alias) else found

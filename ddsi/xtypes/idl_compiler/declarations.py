@@ -118,8 +118,11 @@ class Alias(Declaration):
     """What :func:`collections_inside` finds; kept, so that a chain of typedefs is not walked again and again."""
     levels: int = 0
     """What :func:`levels_of` finds."""
+    links: int = 1
+    """How many typedefs there are from this one to the type behind them."""
 
     def __post_init__(self) -> None:
+        self.links = 1 + (self.type.links if isinstance(self.type, Alias) else 0)
         self.collections = collections_inside(self.type)
         self.levels = levels_of(self.type)
 
