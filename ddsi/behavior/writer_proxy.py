@@ -38,6 +38,7 @@ class WriterProxy:
         "_acknack_count",
         "_asked_in_vain",
         "_asked_sn",
+        "_contradicted_sn",
         "_heartbeat_count",
         "_heartbeat_time",
         "_nack_frag_count",
@@ -91,6 +92,7 @@ class WriterProxy:
         self.is_alive = True
         self.liveliness_due = math.inf
         self._asked_sn = self._asked_in_vain = 0
+        self._contradicted_sn = 0
         self._acknack_count = 0
         self._nack_frag_count = 0
         self._heartbeat_count = 0
@@ -155,7 +157,11 @@ class WriterProxy:
         # A writer that no longer has a number which it has already sent was written anew (RTPS 2.5 §8.2.3: they
         # ascend).
         is_known = last >= self.reorder.next_sn - 1 or self.uses_filter
-        self.contradictions = 0 if is_known else self.contradictions + 1
+        if is_known or self._contradicted_sn != self.reorder.next_sn:
+            # Nor was it written anew where its samples go on: these have overtaken a HEARTBEAT that was long under way.
+            self.contradictions = 0
+        self._contradicted_sn = self.reorder.next_sn
+        self.contradictions += not is_known
         lost = self.reorder.skip_to(first)
         # Not the most that was ever said, which anybody may have forged: the writer knows best what it has.
         self.last_seq = max(self.reorder.highest_sn, last)

@@ -50,7 +50,7 @@ _UNKNOWN_ID = bytes(4)
 # No writer gets that far in 100,000 years at a million samples a second.  Beyond it, what we add to a peer's numbers
 # might no longer fit the wire.
 _NUMBERS_END = 1 << 62
-_CONTRADICTIONS_OF_A_RESTART = 2  # one may be a HEARTBEAT that was long under way
+_CONTRADICTIONS_OF_A_RESTART = 3  # one or two may be HEARTBEATs that were long under way
 # What one message may ask for beyond its parsing, counted as if each were so many members of a number set.  Honest ones
 # hold an announcement of a participant, some sets, and the end of one large sample with the beginning of another.
 _MOST_WORK = 16_384

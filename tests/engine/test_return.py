@@ -173,3 +173,36 @@ def test_one_that_does_not_repeat_what_was_acknowledged_holds_nothing_up() -> No
     assert [change.sequence_number for info, change in reader.history.take() if info.valid_data] == [4, 5]
     asked = requested(ours)
     assert (asked[0], asked[-1]) == (1, 6)
+
+
+def test_heartbeats_that_samples_have_overtaken_are_no_restart() -> None:
+    """A network that reorders: what they say was true when they were sent."""
+    ours, stranger = engine(), Stranger()
+    reader = ours.create_reader("Square", "T", reader_qos(LATE), 0.0, is_keyed=False)
+    assert reader.history is not None
+    stranger.introduce(ours)
+    ours.receive_datagram(stranger.sedp_writer(qos=LATE), stranger.address, 0.0)
+    ours.receive_datagram(heartbeat(stranger, 0, 1), stranger.address, 0.0)
+    ours.receive_datagram(application_data(stranger, 1), stranger.address, 0.0)
+    for number in range(2, 12):
+        now = 0.01 * number
+        ours.receive_datagram(application_data(stranger, number), stranger.address, now)
+        ours.receive_datagram(heartbeat(stranger, number - 2, number), stranger.address, now)
+    assert [change.sequence_number for _, change in reader.history.take()] == list(range(1, 12))
+    assert reader.matched.current_count == 1
+    assert reader.matched.total_count == 1
+
+
+def test_one_that_counts_anew_is_a_restart() -> None:
+    """Its HEARTBEATs know nothing of what it sent, and nothing comes that would."""
+    ours, stranger = engine(), Stranger()
+    reader = ours.create_reader("Square", "T", reader_qos(LATE), 0.0, is_keyed=False)
+    stranger.introduce(ours)
+    ours.receive_datagram(stranger.sedp_writer(qos=LATE), stranger.address, 0.0)
+    ours.receive_datagram(heartbeat(stranger, 0, 1), stranger.address, 0.0)
+    for number in (1, 2, 3):
+        ours.receive_datagram(application_data(stranger, number), stranger.address, 0.0)
+    for count in (2, 3, 4):
+        assert reader.matched.current_count == 1
+        ours.receive_datagram(heartbeat(stranger, 0, count), stranger.address, 1.0 + count)
+    assert reader.matched.current_count == 0
