@@ -15,7 +15,12 @@ from .peers.catalogue import CYCLONE_C, CYCLONE_PYTHON, FAST_DDS, OURS
 from .peers.options import Options
 from .peers.peer import Peer
 
-STORM = Weather(loss=0.1, delay=0.02, jitter=0.01, duplicate=0.05, reorder=0.05)
+WEATHERS = {
+    "loss": Weather(loss=0.1),
+    "delay": Weather(delay=0.05, jitter=0.02),
+    "disorder": Weather(duplicate=0.1, reorder=0.1),
+}
+STORM = Weather(loss=0.1, delay=0.05, jitter=0.02, duplicate=0.05, reorder=0.05)
 SEED = 20
 PAIRS = [
     pytest.param(OURS, OURS, id="ddsi-ddsi"),
@@ -32,10 +37,12 @@ FRAGMENT_PAIRS = [
 PATIENT = Options(keyless=True, wait_s=40)
 
 
-async def play_in_storm(publisher: Peer, subscriber: Peer, options: Options, *, is_late: bool = False) -> None:
+async def play_in_storm(
+    publisher: Peer, subscriber: Peer, options: Options, *, weather: Weather = STORM, is_late: bool = False
+) -> None:
     publisher.locate()
     subscriber.locate()
-    with relayed_namespaces("pub", "sub", weather=STORM, seed=SEED) as (hosts, relay):
+    with relayed_namespaces("pub", "sub", weather=weather, seed=SEED) as (hosts, relay):
         try:
             async with scenario(f"storm {publisher}-{subscriber}", deadline=100) as stage:
                 told = replace(options, readers=0) if is_late else options
@@ -44,7 +51,16 @@ async def play_in_storm(publisher: Peer, subscriber: Peer, options: Options, *, 
         except BaseException as error:
             error.add_note(relay.report())
             raise
-        assert relay.links["pub", "sub"].counters.lost > 0, "the storm did not touch anything"
+        counters = relay.links["pub", "sub"].counters
+        assert counters.lost > 0 or not weather.loss, "the storm did not touch anything"
+        assert min(counters.duplicated, counters.reordered) > 0 or not weather.reorder, "nothing was out of order"
+
+
+@pytest.mark.parametrize("weather", WEATHERS.values(), ids=WEATHERS)
+@async_test
+async def test_reliable_samples_all_arrive_in_any_weather(weather: Weather) -> None:
+    """Each kind of weather alone; all of it at once is the storm."""
+    await play_in_storm(OURS, OURS, replace(PATIENT, count=100), weather=weather)
 
 
 @pytest.mark.parametrize(("publisher", "subscriber"), PAIRS)
