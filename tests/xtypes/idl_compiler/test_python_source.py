@@ -11,10 +11,13 @@ from typing import Any
 import pytest
 
 from ddsi import idl
+from ddsi.xtypes import type_support
+from ddsi.xtypes.defaults import zero_value
 from ddsi.xtypes.idl_compiler.loading import compile_idl
 from ddsi.xtypes.idl_compiler.python_source import PythonSource
 from ddsi.xtypes.idl_compiler.source_text import SourceText
-from ddsi.xtypes.resolution import named_type
+from ddsi.xtypes.model import StructType
+from ddsi.xtypes.resolution import STRUCT_ATTRIBUTE, named_type
 from tests.xtypes.vectors import ALL
 
 from .same_types import difference
@@ -102,6 +105,11 @@ SOURCES = {
     "only an enum": "enum E { A };",
     "a long name": f"module m {{ struct {'Long' * 18} {{ long {'long_' * 20}; string {'text_' * 18}; }}; }};",
     "a long constant": f'const string S = "{"text " * 20}"; const string T = "{"text " * 15}";',
+    "empty": "struct A { }; @mutable struct B : A { }; bitset C { bitfield<3> x; }; bitset D : C { };",
+    "recursive": "struct A; typedef sequence<A> As; typedef As Bs;"
+    "struct A { @optional Bs x; @optional A y; Bs z[2]; };"
+    "typedef sequence<As> Cs; struct B : A { @optional Cs c; map<long, Bs> d; };",
+    "reserved": "struct str { long int; }; struct field { @default(1) long idl; str enum_; }; enum E { mro, value };",
     "long labels": "union U switch (long) { case " + ": case ".join(map(str, range(1000, 1030))) + ": long x; };",
     "comments": """
         // say "hi"
@@ -150,6 +158,15 @@ def imported(path: Path) -> Any:
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_the_source_runs_and_its_types_can_be_sent(written: dict[str, Path], name: str) -> None:
+    for class_ in vars(imported(written[name])).values():
+        if isinstance(getattr(class_, "__dict__", {}).get(STRUCT_ATTRIBUTE), StructType):
+            support = type_support(class_)
+            assert support.representations
+            assert isinstance(support.serializer(support.representations[0])(zero_value(support.struct)), bytes)
 
 
 def test_the_source_has_the_types_that_load_gives(written: dict[str, Path]) -> None:
