@@ -11,6 +11,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Final
 
@@ -21,7 +22,7 @@ from ddsi.structure.discovered import DiscoveredParticipantData
 from ddsi.structure.guid import Guid
 
 from .access_control_plugin import AccessControl
-from .announced import info, participant_refusal, token
+from .announced import info, participant_refusal, token, vouched
 from .authentication_plugin import Authentication, AuthStatusKind, RemoteIdentity
 from .generic_message import GenericMessage
 from .handles import HandshakeHandle, IdentityHandle, Pending, PermissionsHandle, SharedSecretHandle
@@ -341,13 +342,19 @@ class AdmissionDesk:
         """The peer is who it says; what may it do?  After a renewal too, as its permissions may be others now."""
         authentication = self._plugins.authentication
         assert handshake.remote_identity is not None
+        credential = authentication.get_authenticated_peer_credential_token(handle)
+        remote.vouched = vouched(remote.data.security_parameters, credential.binary_property("c.pdata") or b"")
+        difference = participant_refusal(self._own.info, info(remote.vouched, ParameterId.PARTICIPANT_SECURITY_INFO))
+        if difference:
+            self._refuse(remote, f"its governance protects participants otherwise: {difference}")
+            return
         shared_secret = authentication.get_shared_secret(handle)
         result = self._plugins.access_control.validate_remote_permissions(
             authentication,
             self._own.identity,
             handshake.remote_identity,
-            token(remote.data.security_parameters, ParameterId.PERMISSIONS_TOKEN),
-            authentication.get_authenticated_peer_credential_token(handle),
+            token(remote.vouched, ParameterId.PERMISSIONS_TOKEN),
+            credential,
         )
         self._permitted(remote, handshake, shared_secret, result, now)
 
@@ -360,6 +367,7 @@ class AdmissionDesk:
         now: float,
     ) -> None:
         if handshake not in (remote.handshake, remote.renewal):
+            self._plugins.authentication.return_sharedsecret_handle(shared_secret)
             return
         match result:
             case Pending(job):
@@ -367,12 +375,15 @@ class AdmissionDesk:
                     remote, job, lambda result, now: self._permitted(remote, handshake, shared_secret, result, now)
                 )
             case Refused(reason):
+                self._plugins.authentication.return_sharedsecret_handle(shared_secret)
                 self._refuse(remote, reason)
             case PermissionsHandle():
                 refusal = self._plugins.access_control.check_remote_participant(
                     result, self._own.domain_id, remote.data
                 )
                 if refusal is not None:
+                    self._plugins.authentication.return_sharedsecret_handle(shared_secret)
+                    self._plugins.access_control.return_permissions_handle(result)
                     self._refuse(remote, refusal.reason)
                 else:
                     self._admit(remote, handshake, shared_secret, result, now)
@@ -409,6 +420,7 @@ class AdmissionDesk:
                 remote.guid,
             )
         remote.crypto, remote.shared_secret, remote.permissions = crypto, shared_secret, permissions
+        remote.data = replace(remote.data, security_parameters=remote.vouched)
         if remote.standing is Standing.ADMITTED:
             volatile = [endpoint for endpoint in self._own.endpoints.values() if endpoint.is_volatile]
             self._keys.begin_anew(remote, volatile, now)

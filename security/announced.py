@@ -1,6 +1,7 @@
 """What SPDP and SEDP say about security: tokens and attribute masks, as parameters.  DDS-Security 1.1 §7.4.1, §9.3.4.
 
-Values in little-endian octets, as the core carries them.  Those of a peer are untrusted until its handshake is done.
+Values in little-endian octets, as the core carries them.  Those of a peer are untrusted until its handshake is done:
+then :func:`vouched` puts what it said under its signature in the place of what anybody may have said in its name.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import Final
 
-from ddsi.serialization import ParameterId, Reader, Writer
+from ddsi.serialization import ParameterId, ParameterList, Reader, Writer
+from ddsi.spi import Octets
 from ddsi.structure.discovered import Parameter
 from ddsi.structure.errors import MalformedMessage
 
@@ -30,13 +32,17 @@ __all__ = [
     "info",
     "info_parameter",
     "participant_info",
+    "participant_parameters",
     "participant_refusal",
     "token",
     "token_parameter",
+    "vouched",
 ]
 
 _VALID: Final = 1 << 31
 _MASKS: Final = struct.Struct("<II")
+_BIG_ENDIAN_MASKS: Final = struct.Struct(">II")
+_PL_CDR_BE, _PL_CDR_LE = b"\x00\x02\x00\x00", b"\x00\x03\x00\x00"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +84,49 @@ def token(parameters: Iterable[Parameter], parameter_id: ParameterId) -> DataHol
     """The token that was announced; NIL where there is none, or none that can be read."""
     for pid, value in parameters:
         if pid == parameter_id:
-            try:
-                return read_data_holder(Reader(value, little_endian=True))
-            except MalformedMessage:
-                return NIL
+            return _data_holder(value, little_endian=True)
     return NIL
+
+
+def _data_holder(octets: Octets, *, little_endian: bool) -> DataHolder:
+    try:
+        return read_data_holder(Reader(octets, little_endian=little_endian))
+    except MalformedMessage:
+        return NIL
+
+
+def participant_parameters(participant_data: bytes) -> ParameterList:
+    """The parameters of ``c.pdata``, by which a participant says in the handshake what SPDP says of it (§9.3.2.5.1).
+
+    A big-endian list with its sentinel and without encapsulation, as Cyclone DDS, Fast DDS and OpenDDS write it; an
+    encapsulation header that others may put before it is tolerated.  Untrusted.  Raises MalformedMessage.
+    """
+    # Neither header begins a list of a participant's: it would be an empty parameter 2 or 3.
+    head = participant_data[:4]
+    start = len(head) if head in (_PL_CDR_BE, _PL_CDR_LE) else 0
+    parameters, _ = ParameterList.decode(participant_data, little_endian=head == _PL_CDR_LE, start=start)
+    return parameters
+
+
+def vouched(announced: Iterable[Parameter], participant_data: bytes) -> tuple[Parameter, ...]:
+    """What a participant announced in the clear, corrected by what it said in the handshake, under its signature.
+
+    Only what security decides by, and nobody changes who lives: tokens and masks.  Anybody can announce in its name, so
+    a difference tells nothing of the participant, and must not shut it out.  A plugin may know no ``participant_data``.
+    """
+    found: dict[int, Parameter] = {}
+    try:
+        said = participant_parameters(participant_data)
+    except MalformedMessage:
+        return tuple(announced)
+    for pid in (ParameterId.IDENTITY_TOKEN, ParameterId.PERMISSIONS_TOKEN):
+        if (value := said.get(pid)) is not None:
+            found[pid] = token_parameter(pid, _data_holder(value, little_endian=said.little_endian))
+    pid = ParameterId.PARTICIPANT_SECURITY_INFO
+    if (value := said.get(pid)) is not None and len(value) >= _MASKS.size:
+        masks = _MASKS if said.little_endian else _BIG_ENDIAN_MASKS
+        found[pid] = info_parameter(pid, SecurityInfo(*masks.unpack_from(value)))
+    return (*(parameter for parameter in announced if parameter[0] not in found), *found.values())
 
 
 def participant_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
-from ddsi.structure.discovered import DiscoveredParticipantData
+from ddsi.structure.discovered import DiscoveredParticipantData, Parameter
 from ddsi.structure.guid import Guid
 
 from .generic_message import GenericMessage
@@ -34,6 +34,8 @@ class RemoteParticipant:
 
     ``said``: the last handshake message of one that waits for its turn.
 
+    ``vouched``: what it announced of its security, in the words that it signed.
+
     ``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first.
     """
 
@@ -43,6 +45,7 @@ class RemoteParticipant:
     handshake: Handshake | None = None
     renewal: Handshake | None = None
     renewal_asked: tuple[float, int] | None = None
+    vouched: tuple[Parameter, ...] = ()
     said: GenericMessage | None = None
     permissions: PermissionsHandle | None = None
     shared_secret: SharedSecretHandle | None = None

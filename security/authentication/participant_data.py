@@ -1,25 +1,22 @@
 """``c.pdata``: the participant data inside a handshake.  DDS-Security 1.1 §9.3.2.5.1.
 
-A big-endian parameter list with its sentinel and without encapsulation, as Cyclone DDS, Fast DDS and OpenDDS write it;
-an encapsulation header that others may put before it is tolerated.  Hostile until the handshake is done; for hashes the
-octets are opaque.  Read is only what can be compared with what the plugin was told of the participant; the service
-compares the rest.
+Hostile until the handshake is done; for hashes the octets are opaque.  Read is only what can be compared with what the
+plugin was told of the participant; the service looks at the rest when it is proven (:func:`..announced.vouched`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ddsi.serialization import ParameterId, ParameterList, Reader
+from ddsi.serialization import ParameterId, Reader
 from ddsi.structure.errors import MalformedMessage
 from ddsi.structure.guid import Guid
 
+from ..announced import participant_parameters
 from ..tokens import IdentityToken, read_data_holder
 from .not_trusted import NotTrusted
 
 __all__ = ["ParticipantData"]
-
-_PL_CDR_BE, _PL_CDR_LE = b"\x00\x02\x00\x00", b"\x00\x03\x00\x00"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +29,11 @@ class ParticipantData:
     @classmethod
     def read(cls, octets: bytes) -> ParticipantData:
         """Raises NotTrusted when the octets are no parameter list, or do not tell the Guid."""
-        # Neither header begins a list of a participant's: it would be an empty parameter 2 or 3.
-        start = len(_PL_CDR_BE) if octets[:4] in (_PL_CDR_BE, _PL_CDR_LE) else 0
-        little_endian = octets[:4] == _PL_CDR_LE
         try:
-            parameters, _ = ParameterList.decode(octets, little_endian=little_endian, start=start)
+            parameters = participant_parameters(octets)
             token = parameters.get(ParameterId.IDENTITY_TOKEN)
-            identity_token = None if token is None else read_data_holder(Reader(token, little_endian=little_endian))
+            reader = None if token is None else Reader(token, little_endian=parameters.little_endian)
+            identity_token = None if reader is None else read_data_holder(reader)
         except MalformedMessage as error:
             raise NotTrusted("its participant data (c.pdata) is no parameter list") from error
         guid = parameters.get(ParameterId.PARTICIPANT_GUID)

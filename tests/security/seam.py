@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from random import Random
 
-from ddsi.serialization import Writer
+from ddsi.discovery.parameters import participant_parameters
 from ddsi.spi import ADMITTED, Admission, Compute, Decided, LocalParticipant, Octets, Outcome, Revoked, SendMessage
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import EntityId, Guid
@@ -59,7 +59,7 @@ class Side:
             builtin_endpoints=announcement.builtin_endpoints,
             security_parameters=announcement.parameters,
         )
-        self.hooks.announced(parameter_list(self.guid))
+        self.hooks.announced(participant_parameters(self.data, little_endian=False).encode())
         self.decided: dict[tuple[Guid, Guid], Admission] = {}
         self.revoked: list[str] = []
         self.under_way: list[SendMessage] = []
@@ -97,17 +97,6 @@ class Side:
 
     def open(self, octets: Octets, source: Side) -> Octets | Outcome:
         return self.hooks.decode_submessage(octets, source.guid.prefix)
-
-
-def parameter_list(guid: Guid) -> bytes:
-    """PID_PARTICIPANT_GUID and the sentinel, big-endian."""
-    writer = Writer(little_endian=False)
-    writer.u16(0x0050)
-    writer.u16(16)
-    writer.guid(guid)
-    writer.u16(1)
-    writer.u16(0)
-    return writer.getvalue()
 
 
 def deliver(*sides: Side, dice: Random | None = None, now: float = 0.0) -> None:

@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 
+from ddsi.serialization import ParameterId
 from ddsi.spi import (
     ADMITTED,
     PENDING,
@@ -25,12 +26,13 @@ from ddsi.spi import Protection as Level
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
 from ddsi.structure.cache_change import CacheChange, ChangeKind
-from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData, Parameter
 from ddsi.structure.errors import ConfigurationError, NotAllowedBySecurity
 from ddsi.structure.guid import EntityId, EntityKind, Guid
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import Property
 from ddsi_security import service
+from ddsi_security.announced import SecurityInfo, info_parameter, token_parameter
 from ddsi_security.authentication.handshake import Handshake
 from ddsi_security.authentication.not_trusted import NotTrusted
 from ddsi_security.authentication.signatures import SoftwareKey
@@ -94,6 +96,41 @@ def test_two_identities_of_one_authority_admit_each_other(governance: str) -> No
             writer, reader = topic.writer_id, topic.reader_id
             assert one.decided[(one.endpoint(writer), other.endpoint(reader))] is ADMITTED, topic.name
             assert one.decided[(one.endpoint(reader), other.endpoint(writer))] is ADMITTED, topic.name
+
+
+def announcing(side: Side, *parameters: Parameter) -> DiscoveredParticipantData:
+    """What somebody says in the clear in this participant's name."""
+    changed = {**dict(side.data.security_parameters), **dict(parameters)}
+    return replace(side.data, security_parameters=tuple(changed.items()))
+
+
+@pytest.mark.parametrize(
+    "forged",
+    [
+        token_parameter(ParameterId.PERMISSIONS_TOKEN, DataHolder("another access control plugin")),
+        token_parameter(ParameterId.PERMISSIONS_TOKEN, DataHolder()),
+        info_parameter(ParameterId.PARTICIPANT_SECURITY_INFO, SecurityInfo(0, 0)),
+    ],
+    ids=["another plugin", "no permissions", "no protection"],
+)
+def test_what_a_peer_signed_counts_and_not_what_was_announced_in_its_name(forged: Parameter) -> None:
+    alice, bob = Side("alice"), Side("bob")
+    alice.hooks.remote_participant(announcing(bob, forged), 0.0)
+    bob.hooks.remote_participant(alice.data, 0.0)
+    deliver(alice, bob)
+    assert alice.has_admitted(bob)
+    shown = alice.hooks.participant_security(bob.guid).permissions_token
+    assert shown.class_id == bob.hooks.participant_security(bob.guid).permissions_token.class_id
+
+
+def test_a_peer_that_signs_another_governance_is_refused_whatever_was_announced() -> None:
+    alice, bob = Side("alice"), Side("bob", "governance_data")
+    alice.hooks.remote_participant(announcing(bob, *alice.data.security_parameters[2:]), 0.0)
+    bob.hooks.remote_participant(announcing(alice, *bob.data.security_parameters[2:]), 0.0)
+    deliver(alice, bob)
+    refusal = alice.decided[(alice.guid, bob.guid)]
+    assert isinstance(refusal, Refused)
+    assert "governance protects participants otherwise" in refusal.reason
 
 
 def test_the_guid_is_bound_to_the_subject() -> None:

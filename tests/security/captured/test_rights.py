@@ -27,6 +27,7 @@ from ddsi_security.access_control.permissions import Permissions
 from ddsi_security.access_control.smime import verify
 from ddsi_security.access_control.subject_name import SubjectName
 from ddsi_security.access_control_plugin import ReaderAdmission
+from ddsi_security.announced import info, token, vouched
 from ddsi_security.attributes import EndpointSecurityAttributes, ParticipantSecurityAttributes
 from ddsi_security.authentication.identities import RemoteIdentityHandle
 from ddsi_security.cryptographic.key_material import exchange_key_material
@@ -194,3 +195,18 @@ def announced_readers(name: str, prefix: GuidPrefix) -> list[tuple[DiscoveredRea
         for writer_id, source, payload in decoded(name).announcements
         if writer_id in READERS and source == prefix
     ]
+
+
+@pytest.mark.parametrize("name", SECURED)
+def test_what_they_say_in_the_handshake_is_what_they_announced(name: str) -> None:
+    """So no vendor's honest participant is another one for what it signed."""
+    for believer in everybody(name):
+        announced = believer.peer_data.security_parameters
+        credential = believer.plugin.get_authenticated_peer_credential_token(believer.handshake)
+        said = vouched((), credential.binary_property("c.pdata") or b"")
+        assert {pid for pid, _ in said} == {pid for pid, _ in announced}
+        for pid in (ParameterId.IDENTITY_TOKEN, ParameterId.PERMISSIONS_TOKEN):
+            assert token(said, pid) == token(announced, pid)
+        assert info(said, ParameterId.PARTICIPANT_SECURITY_INFO) == info(
+            announced, ParameterId.PARTICIPANT_SECURITY_INFO
+        )
