@@ -250,7 +250,7 @@ class ValueReader:
         residue = emitter.residue
         while (behind := residue.meet(after(element, residue, encoding))) != residue:
             residue = behind
-        with emitter.loop(f"for _ in range({count}):", residue):
+        with emitter.loop(f"for _ in range({count}):", residue), self._plan.inside():
             expression = self.value(element)
             emitter.flush()
             emitter.then(f"{value}.append({expression})")
@@ -266,7 +266,7 @@ class ValueReader:
         value = self._source.fresh("m")
         emitter.flush()
         emitter.then(f"{value} = {{}}")
-        with emitter.loop(f"for _ in range({count}):", UNKNOWN):
+        with emitter.loop(f"for _ in range({count}):", UNKNOWN), self._plan.inside():
             key = self._source.fresh("x")
             expression = self.value(type_.key)
             emitter.flush()

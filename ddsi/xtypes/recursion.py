@@ -12,13 +12,17 @@ from contextlib import contextmanager
 
 from .model import Composite, nested_structs, reachable_structs
 
-__all__ = ["FunctionPlan", "is_recursive"]
+__all__ = ["DEEPEST_COLLECTION", "FunctionPlan", "is_recursive"]
 
 _MOST_INLINED = 128
 """Structs put in line in one generated module; those beyond become functions."""
 
 _DEEPEST_INLINED = 8
-"""Structs in line inside one another.  Each may open a loop, and Python nests 20 of them."""
+"""Structs and loops inside one another, up to which a struct is put in line.  Python nests 20 loops, and the struct's
+own members may have ``DEEPEST_COLLECTION`` more."""
+
+DEEPEST_COLLECTION = 12
+"""Sequences, arrays and maps of one member inside one another."""
 
 
 def is_recursive(struct: Composite) -> bool:
@@ -58,7 +62,7 @@ class FunctionPlan:
 
     @contextmanager
     def inside(self, depth: int | None = None) -> Iterator[None]:
-        """While a struct is written in line; ``depth`` 0 while it is written as a function."""
+        """While a struct is written in line, or a loop; ``depth`` 0 while it is written as a function."""
         before = self._depth
         self._depth = before + 1 if depth is None else depth
         yield

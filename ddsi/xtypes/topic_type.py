@@ -17,7 +17,7 @@ from .model import (
     UnionType,
     reachable_structs,
 )
-from .recursion import is_recursive
+from .recursion import DEEPEST_COLLECTION, is_recursive
 
 __all__ = ["complete", "default_representations"]
 
@@ -34,7 +34,7 @@ def complete(struct: StructType) -> StructType:
             _refuse_endless(inner)
         for inner in reachable_structs(struct):
             for member in inner.members:
-                _refuse_elements_without_octets(inner, member)
+                _refuse_unfit_elements(inner, member)
     except NameError as error:
         raise BadParameter(f"{struct.type_name}: an annotation cannot be resolved: {error}") from error
     return struct
@@ -62,10 +62,18 @@ def _refuse_endless(struct: Composite) -> None:
                 pending.append(type_)
 
 
-def _refuse_elements_without_octets(composite: Composite, member: Member) -> None:
-    """A sequence of empty structs would have any number of elements in no octets, and reading it no bound in time."""
+def _refuse_unfit_elements(composite: Composite, member: Member) -> None:
+    """Nesting is bounded by what Python can compile.  And a sequence of empty structs would have any number of elements
+    in no octets, and reading it no bound in time."""
     type_: IdlType = member.type
+    depth = 0
     while isinstance(type_, (SequenceType, ArrayType, MapType)):
+        depth += 1
+        if depth > DEEPEST_COLLECTION:
+            raise BadParameter(
+                f"{composite.python_class.__name__}.{member.name}: sequences, arrays and maps nest deeper than"
+                f" {DEEPEST_COLLECTION}; put a struct between them"
+            )
         element = type_.value if isinstance(type_, MapType) else type_.element
         if not isinstance(type_, MapType) and not _has_octets(element):
             raise BadParameter(

@@ -229,7 +229,7 @@ class ValueWriter:
         emitter.align(4)
         emitter.item("I", 4, count)
         key, item = self._source.fresh("v"), self._source.fresh("v")
-        with emitter.loop(f"for {key}, {item} in {value}.items():", UNKNOWN):
+        with emitter.loop(f"for {key}, {item} in {value}.items():", UNKNOWN), self._plan.inside():
             self.value(type_.key, key)
             self.value(type_.value, item)
         self._close_dheader(delimiter)
@@ -258,7 +258,7 @@ class ValueWriter:
         while (behind := residue.meet(after(element, residue, encoding))) != residue:
             residue = behind
         item = self._source.fresh("v")
-        with emitter.loop(f"for {item} in {value}:", residue):
+        with emitter.loop(f"for {item} in {value}:", residue), self._plan.inside():
             self.value(element, item)
 
     def _open_dheader(self, type_: IdlType) -> tuple[str, Position] | None:

@@ -11,6 +11,7 @@ from typing import TypeVar
 from .. import model
 from ..annotations import LARGEST_MEMBER_ID, autoid_hash
 from ..model import Extensibility, Primitive, String
+from ..recursion import DEEPEST_COLLECTION
 from .annotations import Annotations
 from .constants import evaluate, fitted
 from .declarations import (
@@ -72,8 +73,6 @@ _Composite = TypeVar("_Composite", StructDeclaration, UnionDeclaration)
 
 MOST_ELEMENTS = (1 << 32) - 1
 MOST_DIMENSIONS = 16
-DEEPEST_COLLECTION = 12
-"""Each is a loop in the generated code, and Python nests 20 of them."""
 DEEPEST_TYPE = 100
 """Structs and unions inside one another."""
 MOST_BASES = 100

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddsi import deserialize, idl, serialize
+from ddsi import XCDR1, XCDR2, deserialize, idl, serialize
 from ddsi.xtypes.idl_compiler.expressions import KEYWORDS
 
 DEEP = 1_000
@@ -123,6 +123,26 @@ def test_what_nests_as_deep_as_it_may_works() -> None:
     for level in range(1, 100):
         value = getattr(types, f"S{level}")(value)
     assert deserialize(types.S99, serialize(value)) == value
+
+
+@pytest.mark.parametrize("collections", [1, 3, 12])
+def test_loops_are_bounded_in_generated_code(collections: int) -> None:
+    """Python nests 20 of them: a struct that would add more becomes a function."""
+    opening, closing = "sequence<" * collections, "> " * collections
+    text = f"struct S0 {{ {opening}string{closing} x; }};"
+    text += "".join(f"struct S{n + 1} {{ {opening}S{n}{closing} x; map<long, S{n}> y; }};" for n in range(6))
+    types = idl.loads(text)
+
+    def nested(value: Any) -> Any:
+        for _ in range(collections):
+            value = [value]
+        return value
+
+    sample = types.S0(nested("a"))
+    for level in range(1, 7):
+        sample = getattr(types, f"S{level}")(nested(sample), {1: sample})
+    for representation in XCDR1, XCDR2:
+        assert deserialize(types.S6, serialize(sample, representation=representation)) == sample
 
 
 def test_long_flat_text_is_fine() -> None:
