@@ -15,7 +15,7 @@ from .declarations import ConstantValue
 from .source_text import IdlError, IdlWarning
 from .syntax import Annotation, Expression, Literal, Name
 
-__all__ = ["Annotations"]
+__all__ = ["BUILTIN", "Annotations"]
 
 _WITHOUT_EFFECT = frozenset(
     [
@@ -45,6 +45,15 @@ _NOT_ACTED_UPON = {
     "try_construct": "a sample that does not fit is always discarded",
     "data_representation": "the QoS chooses the representation",
 }
+
+
+BUILTIN = frozenset(
+    {
+        *("key", "Key", "id", "hashid", "optional", "external", "must_understand", "non_serialized", "default"),
+        *("value", "default_literal", "position", *_WITHOUT_EFFECT, *_NOT_ACTED_UPON),
+    }
+)
+"""Every annotation that has a meaning of its own here."""
 
 
 class Annotations:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from .annotations import BUILTIN
 from .expressions import KEYWORDS, ExpressionParser
 from .source_text import IdlError, IdlWarning
 from .syntax import (
@@ -85,6 +86,8 @@ class Parser(ExpressionParser):
     def __init__(self, tokens: Sequence[Token]) -> None:
         super().__init__([token for token in tokens if token.kind is not TokenKind.PRAGMA or _is_keylist(token)])
         self.warnings: list[IdlWarning] = []
+        self._declared: set[str] = set()
+        """Annotations that the text itself declares: for other programs, and no mistake."""
 
     def specification(self) -> list[Definition]:
         """All definitions, up to the end."""
@@ -314,10 +317,15 @@ class Parser(ExpressionParser):
         return [SkippedNode(name=name, place=start, kind=kind)] if name else []
 
     def _skip_braces(self, kind: str) -> None:
-        """The declaration of an annotation: what it means to others is not known, so it needs no checking."""
+        """The declaration of an annotation: what it means to others is not known, so it needs no checking.
+
+        Some files declare the builtin ones, which mean what they always do.
+        """
         start = self.take().place
         self.take()
-        self.name(f"of the {kind}", any_word=True)
+        name = self.name(f"of the {kind}", any_word=True).text
+        if name not in BUILTIN:
+            self._declared.add(name)
         self.expect("{", f"behind the name of the {kind}")
         depth = 1
         while depth:
@@ -430,7 +438,9 @@ class Parser(ExpressionParser):
             while self.token.text == "::" and not self.token.spaced:  # else it begins the type behind the annotation
                 self.take()
                 name = f"{name}::{self.name('of the annotation', any_word=True).text}"
-            found.append(Annotation(name, self._annotation_arguments(), place))
+            arguments = self._annotation_arguments()
+            if name.rpartition("::")[2] not in self._declared:
+                found.append(Annotation(name, arguments, place))
         return found
 
     def _annotation_arguments(self) -> dict[str, Expression]:

@@ -75,6 +75,13 @@ def test_a_guarded_file_may_be_included_twice(tmp_path: Path, guard: str) -> Non
     assert list(idl.load(tmp_path / "b.idl")) == ["A"]
 
 
+def test_annotations_that_the_text_declares_are_no_surprise() -> None:
+    declared = "@annotation mine { long value default 3; }; @annotation key { boolean value default TRUE; };"
+    types = idl.loads(f"{declared} @mine(5) struct A {{ @mine @key long x; long y; }};")
+    assert types.idl_warnings == ()
+    assert "@key int32 x;" in idl.to_idl(types.A)
+
+
 def test_warnings_are_told() -> None:
     types = idl.loads('#warning old\nconst long N = 1;\n@mine struct A { @unit("m") @odd(3) long x; };')
     assert [str(warning) for warning in types.idl_warnings] == [
