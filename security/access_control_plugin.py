@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 from ddsi.spi import Refused
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos import EndpointQos

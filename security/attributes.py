@@ -6,8 +6,9 @@ them, and two masks of 32 bits tell them to other participants: one whose bits s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntFlag
+
+from ddsi.structure.dataclass import dataclass
 
 __all__ = [
     "DataTags",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Protocol
 
 from ddsi.spi import Refused
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos_policies import Properties
 from ddsi.structure.vendor import VendorId

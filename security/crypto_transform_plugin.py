@@ -6,11 +6,11 @@ DDS-Security 1.1 §8.5.1.9; conventions: :mod:`ddsi_security.plugins`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
 from ddsi.spi import Octets, Outcome, Overhead, Refused
+from ddsi.structure.dataclass import dataclass
 
 from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
 

@@ -6,10 +6,11 @@ know.  All that is read is untrusted: on the stateless topic anybody can write.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from ddsi.serialization import Octets, Reader, Writer
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, TypeVar
+
+from ddsi.structure.dataclass import dataclass
 
 __all__ = [
     "DatareaderCryptoHandle",

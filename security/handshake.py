@@ -24,11 +24,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from typing import Final
 
 from ddsi.spi import Refused
+from ddsi.structure.dataclass import dataclass
 
 from .authentication_plugin import Authentication, HandshakeStep, RemoteIdentity, ValidationResult
 from .generic_message import AUTH, AUTH_REQUEST, NO_MESSAGE, GenericMessage, MessageIdentity

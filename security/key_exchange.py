@@ -17,10 +17,10 @@ Only what a peer wrote under the key that the two share is looked at here, and i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Final, Protocol
 
 from ddsi.spi import ADMITTED, PENDING, Admission, Refused
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 
 from .generic_message import (

@@ -13,11 +13,11 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Final, cast
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.qos_policies import Properties
 

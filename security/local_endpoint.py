@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from ddsi.structure import builtin_entity_ids as ids
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.guid import EntityId, Guid
 
 from .attributes import EndpointSecurityAttributes

@@ -5,9 +5,9 @@ DDS-Security 1.1 §8.6, §8.7; conventions: :mod:`ddsi_security.plugins`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos import EndpointQos
 

@@ -8,10 +8,11 @@ carries tokens without reading them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from ddsi.serialization import Reader, Writer
+from ddsi.structure.dataclass import dataclass
 
 __all__ = [
     "MAX_PROPERTIES",

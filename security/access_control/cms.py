@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-from dataclasses import dataclass
 
 from cryptography import x509
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 
 from .der import DerReader, Tag, object_identifier

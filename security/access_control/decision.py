@@ -22,9 +22,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ddsi.spi import Refused
+from ddsi.structure.dataclass import dataclass
 
 from ..attributes import DataTags
 from .document_error import shown

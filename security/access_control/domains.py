@@ -6,8 +6,7 @@ maximum for one of a single domain.  Documents for a mixed system do well to wri
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 
 from .wildcard import check_expression, matching

@@ -12,8 +12,10 @@ Values only: they hold no plugin and no signature, so that the keystore's tools 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
+
+from ddsi.structure.dataclass import dataclass
 
 from .document_error import DocumentError
 from .domains import Domains, expression_of

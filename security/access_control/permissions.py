@@ -9,10 +9,11 @@ tools and the plugin reason from one code.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 
 from ddsi.spi import Refused
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 
 from ..attributes import DataTags

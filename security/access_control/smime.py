@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import binascii
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 
 from .cms import NotSignedBy, verify_signed_data

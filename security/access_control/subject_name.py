@@ -12,8 +12,9 @@ letter.  Looser comparisons, of which X.500 knows many, could let one person pas
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 
 from .der import DerReader

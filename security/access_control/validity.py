@@ -7,8 +7,9 @@ reads no fraction of more than nine digits.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+
+from ddsi.structure.dataclass import dataclass
 
 from .xml_document import Node
 

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from importlib import resources
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled, and without types)
+
+from ddsi.structure.dataclass import dataclass
 
 from .document_error import DocumentError, did_you_mean, shown
 

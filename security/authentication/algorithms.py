@@ -10,9 +10,9 @@ writes its names as the initiator wrote its own.  Either form is read; hashes co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.vendor import FAST_DDS, VendorId
 
 __all__ = [

@@ -6,7 +6,7 @@ hostile: reading one raises NotTrusted and nothing else.  Whether it is to be be
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import datetime, timedelta
 from typing import Final
 
@@ -15,6 +15,8 @@ from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.x509.oid import ExtensionOID, ObjectIdentifier, SignatureAlgorithmOID
+
+from ddsi.structure.dataclass import dataclass
 
 from .algorithms import SignatureAlgorithm
 from .der import read_element

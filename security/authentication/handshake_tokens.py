@@ -13,10 +13,12 @@ Everything read from a token is untrusted; NotTrusted is all that is raised.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from enum import Enum
 from hashlib import sha256
 from typing import Final
+
+from ddsi.structure.dataclass import dataclass
 
 from ..tokens import AuthRequestMessageToken, DataHolder, HandshakeMessageToken, serialize_binary_properties
 from .not_trusted import NotTrusted

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Final
 
 from cryptography import x509
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import ConfigurationError
 
 from ..properties import IDENTITY_CA, IDENTITY_CERTIFICATE, IDENTITY_CRL, PASSWORD, PRIVATE_KEY, TRUSTED_CA_DIR

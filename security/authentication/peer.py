@@ -5,8 +5,9 @@ Values only, so that certificates can be verified in a worker thread.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.guid import Guid
 
 from ..tokens import IdentityToken

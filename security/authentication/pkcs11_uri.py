@@ -7,10 +7,11 @@ Text only; ``pkcs11_token`` goes and finds it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 from urllib.parse import unquote_to_bytes
 
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import ConfigurationError
 
 from ..resources import read_resource

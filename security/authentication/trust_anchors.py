@@ -7,10 +7,12 @@ certificate that reaches an anchor only through further CAs is refused, as Cyclo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from cryptography import x509
 from cryptography.exceptions import InvalidSignature
+
+from ddsi.structure.dataclass import dataclass
 
 from .certificate import PARSE_ERRORS, Certificate, text_of_time
 from .not_trusted import NotTrusted

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Final
 
 from ddsi.serialization.cursor import Octets, Reader, Writer
+from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import MalformedMessage
 
 from ..handles import SharedSecretHandle

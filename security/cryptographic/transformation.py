@@ -6,9 +6,10 @@ DDS-Security 1.1 §9.5.2.1 (transformation kinds), §9.5.2.3 (CryptoHeader).  Va
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
+
+from ddsi.structure.dataclass import dataclass
 
 from ..attributes import (
     EndpointSecurityAttributes,
