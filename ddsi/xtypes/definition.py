@@ -147,6 +147,7 @@ class _MemberSearch:
             is_external="external" in resolved.flags,
             is_serialized="non_serialized" not in resolved.flags,
             typedefs=resolved.typedefs,
+            hash_name=resolved.hash_name,
         )
         self._check(member, before)
         return member

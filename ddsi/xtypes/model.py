@@ -267,6 +267,8 @@ class Member:
     is_external: bool = False
     is_serialized: bool = True
     typedefs: Typedefs | None = None
+    hash_name: str | None = None
+    """What ``@hashid`` was given; empty where it stood alone, None where it was not there."""
 
     @property
     def name_in_idl(self) -> str:

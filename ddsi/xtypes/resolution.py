@@ -65,6 +65,11 @@ class Resolved:
     bits: Bits | None = None
     typedefs: Typedefs | None = None
 
+    @property
+    def hash_name(self) -> str | None:
+        """What ``idl.hashid`` was given; empty where it stood alone, None where it was not there."""
+        return self.member_id.name if isinstance(self.member_id, HashId) else None
+
 
 @dataclass(frozen=True, slots=True)
 class Resolver:

@@ -161,6 +161,7 @@ class _CaseSearch:
             idl_name=idl_name,
             is_external="external" in resolved.flags,
             typedefs=resolved.typedefs,
+            hash_name=resolved.hash_name,
             labels=tuple(self._label(name, switch.type, label) for label in labels.labels),
             is_default=labels.is_default,
         )

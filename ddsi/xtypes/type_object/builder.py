@@ -189,13 +189,13 @@ class _Builder:
 
     def _member(self, member: Member) -> MemberObject:
         type_ = self._identifier(member.type, member.typedefs)
-        return MemberObject(member.id, _member_flags(member), type_, named(member.name_in_idl))
+        return MemberObject(member.id, _member_flags(member), type_, named(member.name_in_idl), member.hash_name)
 
     def _case(self, case: Case) -> CaseObject:
         type_ = self._identifier(case.type, case.typedefs)
         flags = _member_flags(case) | (MemberFlag.DEFAULT if case.is_default else MemberFlag(0))
         labels = tuple(ord(label) if isinstance(label, str) else int(label) for label in case.labels)
-        return CaseObject(case.id, flags, type_, labels, named(case.name_in_idl))
+        return CaseObject(case.id, flags, type_, labels, named(case.name_in_idl), case.hash_name)
 
 
 # --- what a type needs ---------------------------------------------------------------------------------------

@@ -104,7 +104,7 @@ class _Part:
             for member in struct.members:
                 with writer.delimited():
                     self._member(member)
-                    self._name(member.name)
+                    self._name(member.name, member.hash_name)
 
     def union(self, union: UnionObject) -> None:
         writer = self._writer
@@ -124,7 +124,7 @@ class _Part:
                     writer.u32(len(case.labels))
                     for label in case.labels:
                         writer.i32(label)
-                    self._name(case.name)
+                    self._name(case.name, case.hash_name)
 
     def _member(self, member: MemberObject | CaseObject) -> None:
         self._writer.u32(member.id)
@@ -201,13 +201,22 @@ class _Part:
         if self._is_complete:
             self._writer.string(type_name)
 
-    def _name(self, name: Named) -> None:
-        """CompleteMemberDetail (the name, and no annotations) or MinimalMemberDetail."""
-        if self._is_complete:
-            self._writer.string(name.text)
+    def _name(self, name: Named, hash_name: str | None = None) -> None:
+        """CompleteMemberDetail or MinimalMemberDetail; the only annotation that there may be is ``@hashid``."""
+        writer = self._writer
+        if not self._is_complete:
+            writer.octets(name.hash)
+            return
+        writer.string(name.text)
+        if hash_name is None:
             self._no_annotations()
-        else:
-            self._writer.octets(name.hash)
+            return
+        writer.boolean(True)  # builtin annotations
+        with writer.delimited():
+            writer.skip(3)  # no unit, min, max
+            writer.boolean(True)
+            writer.string(hash_name)
+        writer.boolean(False)  # custom annotations
 
     def _no_annotations(self) -> None:
         """Two optional members, builtin and custom annotations, that are not there."""

@@ -2,7 +2,7 @@
 
 Minimal and complete TypeObjects are the same classes.  A complete one has names; a minimal one has the first four
 octets of the MD5 of each member's name.  Annotations that mean nothing to the encoding (units, ranges, custom ones) are
-not kept.
+not kept; ``hash_name``, what ``@hashid`` was given, is written and not read, since the member id says all of it.
 """
 
 from __future__ import annotations
@@ -64,6 +64,7 @@ class MemberObject:
     flags: MemberFlag
     type: TypeIdentifier
     name: Named
+    hash_name: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,7 @@ class CaseObject:
     type: TypeIdentifier
     labels: tuple[int, ...]
     name: Named
+    hash_name: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

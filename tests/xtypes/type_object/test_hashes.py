@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import pytest
@@ -9,7 +10,8 @@ import pytest
 import ddsi
 from ddsi.structure.errors import BadParameter
 from ddsi.xtypes.definition import struct_type
-from ddsi.xtypes.type_object import BuiltTypes, ComponentIdentifier, describe, encode_identifier
+from ddsi.xtypes.type_object import BuiltTypes, ComponentIdentifier, decode_type_object, describe, encode_identifier
+from ddsi.xtypes.type_object.objects import StructObject
 from tests.xtypes.vector_types import S01, S09, S33, S07Color
 
 from .vectors import VECTORS, compiled
@@ -103,3 +105,45 @@ def test_each_type_is_listed_once_and_not_among_its_own_dependencies() -> None:
     types = ddsi.type_information(S09).minimal_types
     assert types.dependency_count == len(types.dependencies) == 4
     assert types.type not in types.dependencies
+
+
+# --- what the generator of an older release makes, of declarations that the vectors lack ---------------------------
+
+IDLC_IDL = """
+module m {
+  typedef long Num;
+  typedef Num Row[4];
+  @final @nested struct P { @external @optional Num x; @hashid long y; @hashid("foo") long z; };
+  @mutable @autoid(HASH) struct Base { string<300> name; };
+  @appendable @autoid(HASH) union V switch (char) {
+    case 'a': @id(7) P p; case 'b': @hashid double d; default: octet o;
+  };
+  @mutable struct D : Base { sequence<sequence<P, 3> > nested; Row rows[3]; char c; V v; double matrix[2][300]; };
+};
+"""
+
+IDLC_INFORMATION = (
+    "5001000001100040a00000009c00000014000000f14c32dc833f638523979628d64bd100c5000000050000007c00000005000000"
+    "14000000f11af938ad4ad69c621101b903825a002c00000014000000f1858f990dffdfaae124ea45dc0efe005700000014000000"
+    "f18ea97f4529a6c07cb8096e567bd3001300000014000000f137bb645d5c31bf8dfb3894882c3e002c00000014000000f152651e"
+    "34af13eb9c50cc1bf0fe8d007000000002100040a00000009c00000014000000f22420bfc903b9b1d178724cbca5fe00fd000000"
+    "050000007c0000000500000014000000f2c11a1ffe502cac115262282a663e003f00000014000000f2303e2c1a52273a143848f5"
+    "2467fa009100000014000000f211354bb72a1aefc288e559d1a1ab002500000014000000f2c51c931a48cfb170d2a22333c8ed00"
+    "3e00000014000000f2344655a63a5d292cb5c2892ca6a800a0000000"
+)
+"""Of m::D, by idlc of Cyclone DDS 0.10.2 (Debian); it hashes every TypeObject that is needed."""
+
+
+def test_hashed_ids_nested_collections_and_arrays_of_typedefs_are_the_peers() -> None:
+    namespace: Any = ddsi.idl.loads(IDLC_IDL)
+    assert ddsi.type_information(namespace.m.D).encode().hex() == IDLC_INFORMATION
+
+
+def test_what_hashid_was_given_is_skipped_when_read() -> None:
+    namespace: Any = ddsi.idl.loads(IDLC_IDL)
+    types = describe(struct_type(namespace.m.P)).complete
+    written, read = types.objects[types.root].body, decode_type_object(types.octets[types.root]).body
+    assert isinstance(written, StructObject)
+    assert isinstance(read, StructObject)
+    assert [member.hash_name for member in written.members] == [None, "", "foo"]
+    assert read.members == tuple(replace(member, hash_name=None) for member in written.members)
