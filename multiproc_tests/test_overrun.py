@@ -44,7 +44,7 @@ def _pairs(history: str, *, plays_all: bool) -> Iterator[tuple[Peer, Peer]]:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if metafunc.fixturenames[:3] != ["publisher", "subscriber", "seconds"]:
         return
-    plays_all = metafunc.config.getoption("--all-peers", default=False)
+    plays_all = bool(metafunc.config.getoption("--all-peers", default=False))
     history = "keep-all" if metafunc.function is test_who_keeps_all_waits_for_its_reader else "keep-last"
     chosen = [
         pytest.param(
