@@ -16,7 +16,7 @@ from ddsi.spi import NO_OVERHEAD, NOT_FOR_US, NoKeys, Octets, Outcome, Overhead,
 from ddsi.spi import Protection as Level
 from ddsi.structure.builtin_entity_ids import SPDP_WRITER
 from ddsi.structure.guid import Guid
-from ddsi.structure.vendor import OPENDDS, VendorId
+from ddsi.structure.vendor import FAST_DDS, OPENDDS, RTI, RTI_MICRO, VendorId
 
 from .attributes import ParticipantSecurityAttributes
 from .crypto_transform_plugin import SecureSubmessageCategory
@@ -46,6 +46,9 @@ _NOTHING: Parts = ()
 _NONE, _MESSAGE, _SUBMESSAGE = int(Level.NONE), int(Level.MESSAGE), int(Level.SUBMESSAGE)
 _IMPOSSIBLE: Final = 1 << 8
 _DATAREADER_SUBMESSAGE: Final = SecureSubmessageCategory.DATAREADER_SUBMESSAGE
+_ENDS_BY_HASH_ALONE: Final = frozenset((FAST_DDS, RTI, RTI_MICRO))
+"""They dispose and unregister without a payload, so nothing is there that could be protected."""
+_UNPROVEN_END: Final = Rejected("it ends an instance, and nothing of it is protected")
 _SMALL: Final = 1 << 12
 """Octets are quicker to take apart as ``bytes`` than through a view, unless it costs more to copy them."""
 
@@ -216,6 +219,8 @@ class Protection:
         local, remote = pair.local.handle, pair.handle
         assert isinstance(local, DatareaderCryptoHandle)
         assert isinstance(remote, DatawriterCryptoHandle)
+        if not len(payload):
+            return payload if pair.participant.data.vendor_id in _ENDS_BY_HASH_ALONE else _UNPROVEN_END
         if len(payload) < _SMALL:
             payload = bytes(payload)
         return self._cryptographic.decode_serialized_payload(payload, b"", local, remote)

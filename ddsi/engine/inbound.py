@@ -327,10 +327,13 @@ class Inbound:
             self._not_cdr(incoming, remote, data)
             return
         payload: Octets | Outcome = data.serialized_payload
-        if len(data.serialized_payload):
+        is_bare_end = not len(data.serialized_payload) and bool(inline.status & 3)
+        if len(data.serialized_payload) or (is_bare_end and incoming.protection == _CLEAR):
             payload = self._hooks.decode_payload(remote.guid, data.serialized_payload)
         if isinstance(payload, Outcome):
             self.undecodable(payload, incoming.source)
+            if is_bare_end:  # whoever is honest has said all that he has to say under this number
+                self._nothing(incoming, remote, data.reader_id, data.writer_sn)
             return
         self._joined(incoming, remote, data.reader_id, data.writer_sn, bytes(payload), inline, is_key=data.is_key)
 

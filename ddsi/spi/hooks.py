@@ -294,7 +294,10 @@ class SecurityHooks(Protocol):
         ...
 
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
-        """Undo :meth:`encode_payload` (§8.5.1.9.9)."""
+        """Undo :meth:`encode_payload` (§8.5.1.9.9).
+
+        Empty where nothing but a key hash in clear says that an instance has ended: is that believed, of this writer?
+        """
         ...
 
     def protects_payload(self, writer: Guid) -> bool:

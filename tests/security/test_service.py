@@ -24,6 +24,7 @@ from ddsi.spi import (
 )
 from ddsi.spi import Protection as Level
 from ddsi.structure import builtin_entity_ids as ids
+from ddsi.structure import vendor
 from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData, Parameter
@@ -31,6 +32,7 @@ from ddsi.structure.errors import ConfigurationError, NotAllowedBySecurity
 from ddsi.structure.guid import EntityId, EntityKind, Guid
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.qos_policies import Property
+from ddsi.structure.vendor import VendorId
 from ddsi_security import service
 from ddsi_security.announced import SecurityInfo, info_parameter, token_parameter
 from ddsi_security.authentication.handshake import Handshake
@@ -223,6 +225,30 @@ def test_a_payload_is_opened_by_the_reader_it_is_for() -> None:
     assert b"BLUE" not in protected
     assert bob.hooks.protects_payload(alice.endpoint(USER_WRITER))
     assert bytes(bob.hooks.decode_payload(alice.endpoint(USER_WRITER), protected)) == payload  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("governance", "vendor", "is_believed"),
+    [
+        ("governance_data", vendor.OUR_VENDOR_ID, False),
+        ("governance_data", vendor.CYCLONE, False),
+        ("governance_data", vendor.FAST_DDS, True),
+        ("governance_data", vendor.RTI, True),
+        ("governance_meta_sign", vendor.CYCLONE, True),
+    ],
+)
+def test_an_end_that_nothing_protects_is_believed_only_of_who_cannot_do_better(
+    governance: str, vendor: VendorId, is_believed: bool
+) -> None:
+    """A key hash alone, where payloads are protected; Fast DDS and RTI send no more than that."""
+    alice, bob = Side("alice", governance), Side("bob", governance)
+    alice.data = replace(alice.data, vendor_id=vendor)
+    introduce(alice, bob)
+    match_builtin_topics(alice, bob)
+    bob.hooks.local_reader(reader_data(bob))
+    bob.match(USER_READER, alice, USER_WRITER, "Square")
+    outcome = bob.hooks.decode_payload(alice.endpoint(USER_WRITER), b"")
+    assert outcome == b"" if is_believed else isinstance(outcome, Rejected)
 
 
 def test_there_is_nothing_to_send_where_nobody_has_a_key() -> None:

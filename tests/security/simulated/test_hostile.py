@@ -24,12 +24,13 @@ from ddsi.simulation import Domain, Node
 from ddsi.simulation.endpoints import NodeReader, NodeWriter
 from ddsi.simulation.network import Port
 from ddsi.structure import builtin_entity_ids as ids
-from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
 from ddsi.structure.locator import Locator
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import KeepAll, Properties, Reliable, TransientLocal
 from ddsi.structure.sequence_number import NumberSet
+from ddsi.trace.reasons import DropReason
 from ddsi_security.generic_message import read_generic_message, write_generic_message
 from ddsi_security.tokens import DataHolder
 
@@ -97,6 +98,38 @@ def scene(request: pytest.FixtureRequest, identities: dict[str, list[Properties]
 
 def message(prefix: GuidPrefix, *submessages: bytes) -> bytes:
     return b"RTPS\x02\x04\x01\xdd" + prefix + b"".join(submessages)
+
+
+def test_a_forged_end_of_an_instance_is_not_believed_where_only_payloads_are_protected(tmp_path: Path) -> None:
+    """All else of such a DATA is in clear, so the key hash that anybody can read must not be enough."""
+    alice_properties, bob_properties, _ = make_identities(tmp_path / "keystore", "payload")
+    domain = Domain(3)
+    alice, bob = domain.node(properties=alice_properties), domain.node(properties=bob_properties)
+    writer = alice.writer("Square", RELIABLE, keyed=True)
+    reader = bob.reader("Square", RELIABLE, keyed=True)
+    assert domain.run_until(domain.all_matched, 30.0)
+    writer.write(100, key=7)
+    assert domain.run_until(lambda: len(reader.taken) == 1, 5.0)
+    keys = reader.local.keys
+    assert keys is not None
+    inline = ParameterList(
+        [
+            (ParameterId.KEY_HASH, keys.to_key_hash(reader.taken[0][1].key)),
+            (ParameterId.STATUS_INFO, bytes((0, 0, 0, ChangeKind.NOT_ALIVE_DISPOSED))),
+        ]
+    )
+    forged = Data(EntityId.UNKNOWN, writer.guid.entity_id, 2, inline, b"")
+    intruder = Port(Locator.udp_v4("10.9.9.9", 7999), GuidPrefix(b"\x01\xdd" + b"\x66" * 10), lambda *_: None)
+    domain.network.open(intruder)
+    for port in (bob.port, bob._user_port):
+        domain.network.send(intruder, [port.locator], message(alice.guid.prefix, forged.encode()))
+    domain.run(1.0)
+    assert bob.engine.drops[DropReason.REJECTED_BY_SECURITY] > 0
+    assert [change.kind for _, change in reader.taken] == [ChangeKind.ALIVE]
+    for _ in range(2):  # the forged one had the number of the first; a GAP could have taken that from it as well
+        writer.end(ChangeKind.NOT_ALIVE_DISPOSED, key=7)
+    domain.run(5.0)
+    assert [change.kind for _, change in reader.taken] == [ChangeKind.ALIVE, ChangeKind.NOT_ALIVE_DISPOSED]
 
 
 # --- what was sent before -------------------------------------------------------------------------------------------
