@@ -22,8 +22,10 @@ class ParticipantProxy:
     """``last_heard``: engine time of the last datagram from it, which is all that a lease needs.
 
     ``last_manual_assertion``: when it last said that its manual writers live; ``last_protected_assertion``: on the
-    secure topic.  ``announcement``: vendor, version and octets that ``data`` was read from, if they say all of it; the
-    same again need not be read.
+    secure topic.  ``last_proof``: when it last said anything there, where nobody else can.
+
+    ``announcement``: vendor, version and octets that ``data`` was read from, if they say all of it; the same again need
+    not be read.
     """
 
     __slots__ = (
@@ -37,6 +39,7 @@ class ParticipantProxy:
         "is_admitted",
         "last_heard",
         "last_manual_assertion",
+        "last_proof",
         "last_protected_assertion",
         "prefix",
         "refusal",
@@ -50,6 +53,7 @@ class ParticipantProxy:
         self.last_heard = now
         self.last_manual_assertion = now
         self.last_protected_assertion = now
+        self.last_proof = now
         self.is_admitted = False
         self.refusal = ""  # why security refuses it, if it does
         self.has_lost_liveliness = False

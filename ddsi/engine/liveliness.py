@@ -20,6 +20,7 @@ from ..structure.discovered import DiscoveredWriterData
 from ..structure.errors import MalformedMessage
 from ..structure.guid import Guid
 from ..structure.qos_policies import Automatic, ManualByParticipant, ManualByTopic
+from ..structure.vendor import CYCLONE
 from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ __all__ = ["Liveliness"]
 
 AUTOMATIC_KIND = b"\x00\x00\x00\x01"
 MANUAL_BY_PARTICIPANT_KIND = b"\x00\x00\x00\x02"
+_ASSERT_IN_CLEAR = frozenset((CYCLONE,))  # whatever governance says: they use the secure topic for nothing
 _SHORTEST_LEASE_S = 0.01  # nobody can keep a shorter one, and trying to would be all that we do
 
 
@@ -127,7 +129,8 @@ class Liveliness:
         """An assertion of another participant.  RTPS 2.5 §8.4.13.5 (ParticipantMessageData).
 
         On the secure topic it serves all of its writers; on the plain one only those whose liveliness is not
-        protected.  Automatic writers live as long as anything is heard of their participant, however it came.
+        protected, and of these the automatic ones live as long as anything at all is heard of their participant.  What
+        is sent once more by somebody else does not come here: its number was received before.
         """
         if change.kind is not ChangeKind.ALIVE:
             return
@@ -139,6 +142,9 @@ class Liveliness:
         participant = self._engine.participants.get(message.prefix)
         if participant is None or message.prefix != change.writer_guid.prefix:
             return
+        if is_secure:
+            participant.last_proof = now
+            self._revive(participant, Automatic, now)
         if message.kind == MANUAL_BY_PARTICIPANT_KIND:
             participant.last_manual_assertion = now
             if is_secure:
@@ -181,17 +187,27 @@ class Liveliness:
         participant = remote.participant
         if not isinstance(participant, ParticipantProxy):
             return math.inf
-        policy = remote.data.qos.liveliness
+        policy, asserted = remote.data.qos.liveliness, self._asserted.get(remote.guid, 0.0)
         if isinstance(policy, Automatic):
-            return participant.last_heard
+            return max(participant.last_proof, asserted) if self._must_be_proved(remote) else participant.last_heard
         if isinstance(policy, ManualByParticipant):
-            is_protected = any(
+            is_proved = self._must_be_proved(remote)
+            said = participant.last_protected_assertion if is_proved else participant.last_manual_assertion
+            return max(said, asserted)
+        return asserted
+
+    def _must_be_proved(self, remote: RemoteWriter) -> bool:
+        """Does only the secure topic tell that it lives?  Not where that topic itself is not protected."""
+        participant = remote.participant
+        return (
+            isinstance(participant, ParticipantProxy)
+            and participant.vendor_id not in _ASSERT_IN_CLEAR
+            and any(
                 self._engine.local_readers[behavior.guid].protection.liveliness_protected
                 for behavior, _ in remote.readers
             )
-            said = participant.last_protected_assertion if is_protected else participant.last_manual_assertion
-            return max(said, self._asserted.get(remote.guid, 0.0))
-        return self._asserted.get(remote.guid, 0.0)
+            and self._engine.hooks.participant_security(self._engine.guid).is_liveliness_protected
+        )
 
     def revive(self, participant: ParticipantProxy, now: float) -> None:
         """It speaks again: its automatic writers are alive."""

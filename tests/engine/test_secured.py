@@ -21,9 +21,9 @@ from ddsi.spi import ADMITTED, Decided, Refused
 from ddsi.structure import builtin_entity_ids as ids
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos import Qos
-from ddsi.structure.qos_policies import KeepAll, ManualByParticipant, Partition, Reliable, TransientLocal
+from ddsi.structure.qos_policies import Automatic, KeepAll, ManualByParticipant, Partition, Reliable, TransientLocal
 from ddsi.structure.status import SecurityRefused
-from ddsi.structure.vendor import PROTOCOL_VERSION
+from ddsi.structure.vendor import CYCLONE, OUR_VENDOR_ID, PROTOCOL_VERSION, VendorId
 from ddsi.trace.events import EndpointLost, ParticipantLost, SecurityEvent
 from ddsi.trace.reasons import DropReason, LossReason
 from ddsi.trace.sink import MemorySink
@@ -283,6 +283,42 @@ def test_liveliness_is_asserted_where_it_is_protected() -> None:
         a.pump()
     domain.run(0.1)
     assert (reader.local.liveliness.alive_count, open_reader.local.liveliness.alive_count) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("vendor", "is_protected", "lives"),
+    [(OUR_VENDOR_ID, True, False), (OUR_VENDOR_ID, False, True), (CYCLONE, True, True)],
+)
+def test_a_forged_sign_of_life_keeps_no_writer_alive_whose_liveliness_is_protected(
+    vendor: VendorId, is_protected: bool, lives: bool
+) -> None:
+    """Unless governance protects no liveliness at all, or its vendor says so in clear itself."""
+    domain = Domain()
+    a, b, _, reader = talking(domain, qos=RELIABLE | Qos(liveliness=Automatic(1.0)))
+    hooks_of(b).protects_liveliness = is_protected
+    proxy = b.engine.participants[a.guid.prefix]
+    proxy.data = replace(proxy.data, vendor_id=vendor)
+    domain.run(5)
+    assert reader.local.liveliness.alive_count == 1, "it says itself that it lives"
+    a.kill()
+    for _ in range(30):
+        domain.run(0.1)
+        forged = Header(PROTOCOL_VERSION, vendor, a.guid.prefix).encode()
+        b.engine.receive_datagram(forged, a.port.locator, b.now)
+        b.pump()
+    assert a.guid.prefix in b.engine.participants, "its lease is another matter"
+    assert reader.local.liveliness.alive_count == lives
+
+
+def test_a_writer_whose_liveliness_is_protected_revives_when_its_participant_proves_that_it_lives() -> None:
+    domain = Domain()
+    _, _, _, reader = talking(domain, qos=RELIABLE | Qos(liveliness=Automatic(1.0)))
+    domain.network.conditions = LinkConditions(loss=1.0)
+    domain.run(2)
+    assert reader.local.liveliness.alive_count == 0
+    domain.network.conditions = LinkConditions()
+    domain.run(2)
+    assert reader.local.liveliness.alive_count == 1
 
 
 # --- somebody is refused --------------------------------------------------------------------------------------------

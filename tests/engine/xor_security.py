@@ -39,6 +39,7 @@ from ddsi.structure.builtin_entity_ids import BuiltinEndpoints
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import EntityId, Guid, GuidPrefix
+from ddsi.structure.security_information import ParticipantSecurity
 
 __all__ = ["SECURE_BITS", "STATUS_TOKEN", "STRANGE_ISSUER", "TRUSTED_ISSUER", "XorSecurity"]
 
@@ -83,12 +84,14 @@ class Peer:
 class XorSecurity(Plaintext):
     """``issuer``: who vouches for us.  ``withholds``: keys are kept back until :meth:`release`.
 
-    ``announces_openly``: its endpoints are announced in clear, whatever governance says.
+    ``announces_openly``: its endpoints are announced in clear, whatever governance says.  ``protects_liveliness``: the
+    secure topic of assertions is what its name says.
     """
 
     issuer: bytes = TRUSTED_ISSUER
     withholds: bool = False
     announces_openly: bool = False
+    protects_liveliness: bool = True
     peers: dict[bytes, Peer] = field(default_factory=dict)
     changed: list[DiscoveredParticipantData] = field(default_factory=list)
     keys: dict[tuple[Guid, Guid], int] = field(default_factory=dict)
@@ -111,6 +114,9 @@ class XorSecurity(Plaintext):
 
     def announced(self, parameters: bytes) -> None:
         self.said = parameters
+
+    def participant_security(self, participant: Guid) -> ParticipantSecurity:
+        return ParticipantSecurity(is_authenticated=True, is_liveliness_protected=self.protects_liveliness)
 
     def local_writer(self, data: DiscoveredWriterData) -> ProtectedEndpoint:
         is_secret = not (data.topic_name.startswith("Open") or self.announces_openly)
