@@ -73,6 +73,11 @@ class Config:
     spdp_interval: float | None = None
     """Seconds between announcements, once the first quick ones are out.  None: see :attr:`announcement_period`."""
 
+    announce_types: bool = False
+    """Announce what types are made of (XTypes TypeInformation) with writers and readers?  Off, peers match by type
+    names.  On, those that know TypeInformation match by it; but one whose hashes of the type are others, as Cyclone DDS
+    0.10's are, asks for TypeObjects, gets none from us yet, and does not match."""
+
     # --- sizes ---
     max_message_size: int | None = None
     """The longest UDP payload that we send, 512 to 65507.  None: what fits a frame of the interface (up to 65,000
@@ -195,6 +200,8 @@ def _check_where(config: Config) -> None:
     _check_texts("peers", config.peers, '("192.168.1.7", "robot.local:7410")')
     for peer in config.peers:
         _check_peer(peer)
+    if not isinstance(config.announce_types, bool):
+        _refuse("announce_types", config.announce_types, "True or False")
     if not (config.multicast is None or isinstance(config.multicast, bool)):
         _refuse("multicast", config.multicast, "True, False or None")
     if not _is_multicast_group(config.multicast_address):

@@ -45,6 +45,7 @@ FIELDS: Mapping[str, tuple[str, Reader]] = {
     "General/MaxMessageSize": ("max_message_size", parse_memory),
     "General/FragmentSize": ("fragment_size", parse_memory),
     "General/MulticastTimeToLive": ("multicast_ttl", parse_integer),
+    "Discovery/AnnounceTypes": ("announce_types", parse_boolean),
     "Discovery/Tag": ("domain_tag", parse_text),
     "Discovery/LeaseDuration": ("lease_duration", parse_duration),
     "Discovery/SPDPInterval": ("spdp_interval", parse_duration),

@@ -101,6 +101,7 @@ Domain @Id
         Transport
         UseIPv6
     Discovery
+        AnnounceTypes
         DSGracePeriod
         DefaultMulticastAddress
         DiscoveredLocatorPruneDelay

@@ -80,6 +80,7 @@ class DataReader(SampleReader[T]):
             self._pump.now(),
             is_keyed=support.is_keyed,
             keys=_key_codec(topic) if support.is_keyed else None,
+            type_information=support.type_information if self._pump.engine.config.announce_types else b"",
         )
         history = self._reader.history
         assert history is not None

@@ -78,7 +78,12 @@ class DataWriter(Entity, Generic[T]):
         self._progress = trio.lowlevel.ParkingLot()
         self._pump = participant._running_pump()
         self._writer: LocalWriter = self._pump.engine.create_writer(
-            topic.name, support.type_name, resolved, self._pump.now(), is_keyed=support.is_keyed
+            topic.name,
+            support.type_name,
+            resolved,
+            self._pump.now(),
+            is_keyed=support.is_keyed,
+            type_information=support.type_information if self._pump.engine.config.announce_types else b"",
         )
         self._hides_keys = support.is_keyed and self._writer.protection.key_protected
         self._key_hashes: dict[bytes, bytes] = {}

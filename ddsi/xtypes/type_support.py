@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 from typing import Any, Generic, Literal, TypeVar
 
 from ..structure.errors import BadParameter, MalformedSample
@@ -105,6 +106,13 @@ class TypeSupport(Generic[T]):
     def source(self) -> str:
         """The Python source generated so far, for readers and debuggers."""
         return "\n\n".join(self._sources.values())
+
+    @cached_property
+    def type_information(self) -> bytes:
+        """What to announce of the type: its TypeInformation, little endian (DDS-XTypes 1.3 §7.6.3.2.1, PID 0x0075)."""
+        from .type_object import describe  # most programs do not announce types
+
+        return describe(self.struct).information.encode()
 
     # --- samples -----------------------------------------------------------------------------------------
 

@@ -100,6 +100,7 @@ def test_accepted(setting: dict[str, Any]) -> None:
         ({"unacknowledged_octets": math.inf}, "from 1"),
         ({"max_sample_size": 1 << 32}, "from 1 to 4294967295"),
         ({"max_defrag_octets": 1000}, r"at least max_sample_size \(268435456\)"),
+        ({"announce_types": "yes"}, "True or False"),
         ({"trace_level": "loud"}, "one of severe, warning"),
         ({"trace_file": None}, "a str"),
         ({"vendor_id": b"\x01"}, "two octets"),

@@ -318,6 +318,7 @@ class TestValues:
             ("<Discovery><ParticipantIndex>default", {}),
             ("<Discovery><ParticipantIndex>none", {"participant_index": "none"}),
             ("<Discovery><Tag>default", {"domain_tag": "default"}),
+            ("<Discovery><AnnounceTypes>true", {"announce_types": True}),
             ("<Discovery><Peers AddLocalhost='false'/>", {}),
             ("<General><NetworkInterfaceAddress>eth0, 10.0.0.1", {"interfaces": ("eth0", "10.0.0.1")}),
             ("<General><NetworkInterfaceAddress>auto", {}),
