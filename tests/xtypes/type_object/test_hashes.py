@@ -8,10 +8,19 @@ from typing import Annotated, Any
 import pytest
 
 import ddsi
+from ddsi.structure.builtin_entity_ids import SEDP_PUBLICATIONS_WRITER, SEDP_SUBSCRIPTIONS_WRITER
 from ddsi.structure.errors import BadParameter
 from ddsi.xtypes.definition import struct_type
-from ddsi.xtypes.type_object import BuiltTypes, ComponentIdentifier, decode_type_object, describe, encode_identifier
+from ddsi.xtypes.type_object import (
+    BuiltTypes,
+    ComponentIdentifier,
+    decode_type_information,
+    decode_type_object,
+    describe,
+    encode_identifier,
+)
 from ddsi.xtypes.type_object.objects import StructObject
+from tests.discovery.test_captured import endpoints
 from tests.xtypes.vector_types import S01, S09, S33, S07Color
 
 from .vectors import VECTORS, compiled
@@ -147,3 +156,25 @@ def test_what_hashid_was_given_is_skipped_when_read() -> None:
     assert isinstance(read, StructObject)
     assert [member.hash_name for member in written.members] == [None, "", "foo"]
     assert read.members == tuple(replace(member, hash_name=None) for member in written.members)
+
+
+# --- on the wire -----------------------------------------------------------------------------------------------------
+
+FINAL_SHAPE = "@final struct ShapeType { @key string<128> color; long x; long y; long shapesize; };"
+
+
+def test_a_recorded_peer_announces_the_identifiers_that_we_make() -> None:
+    """cyclonedds-python 11.0.1, which leaves the sizes out."""
+    namespace: Any = ddsi.idl.loads(FINAL_SHAPE)
+    ours = ddsi.type_information(namespace.ShapeType)
+    announced = [
+        decode_type_information(data.type_information)
+        for name in ("cyclone11-discovery", "cyclone11-late-joiner", "cyclone11-unicast")
+        for writer_id in (SEDP_PUBLICATIONS_WRITER, SEDP_SUBSCRIPTIONS_WRITER)
+        for data in endpoints(name, writer_id)
+        if data.type_information
+    ]
+    assert len(announced) >= 3
+    for theirs in announced:
+        assert (theirs.minimal, theirs.complete) == (ours.minimal, ours.complete)
+        assert theirs.minimal_types.type.size == 0
