@@ -5,7 +5,7 @@ General layout, top to bottom; a room imports only rooms above it, never this pa
 
     structure      values: Guid, Locator, SequenceNumber, Time, CacheChange, QoS        RTPS 8.2
     serialization  bounded cursors, encapsulation, parameter lists                      RTPS 10
-    xtypes         types, generated codecs, keys                                        DDS-XTypes
+    xtypes         types, generated codecs, keys, TypeObjects                           DDS-XTypes
     config         Config and DDSI_URI
     messages       datagrams to submessages and back                                    RTPS 8.3
     trace          what the engine does, as events, and their rendering
