@@ -18,6 +18,10 @@ AUTOMATIC_LIVELINESS_UPDATE = b"\x00\x00\x00\x01"
 MANUAL_LIVELINESS_UPDATE = b"\x00\x00\x00\x02"
 """All writers of the participant with manual-by-participant liveliness are alive."""
 
+_ENCAPSULATIONS = frozenset(
+    (Encapsulation.CDR_BE, Encapsulation.CDR_LE, Encapsulation.PL_CDR_BE, Encapsulation.PL_CDR_LE)
+)
+
 
 @dataclass(frozen=True, slots=True)
 class ParticipantMessageData:
@@ -53,9 +57,12 @@ class ParticipantMessageData:
 
     @classmethod
     def decode(cls, payload: Octets) -> ParticipantMessageData:
-        """Read a payload of either byte order; octets behind the data are padding."""
+        """Read a payload of either byte order; octets behind the data are padding.
+
+        Fast DDS (2.9) calls the same octets a parameter list.
+        """
         encapsulation = decode_encapsulation(payload).encapsulation
-        if encapsulation not in (Encapsulation.CDR_BE, Encapsulation.CDR_LE):
+        if encapsulation not in _ENCAPSULATIONS:
             reason = f"{encapsulation.name} where plain CDR belongs"
             raise MalformedMessage(reason, element="ParticipantMessageData", offset=0)
         reader = Reader(payload, little_endian=encapsulation.little_endian, start=HEADER_LENGTH)

@@ -53,7 +53,21 @@ def test_message_that_is_cut_short_is_malformed(data: ParticipantMessageData, li
                 ParticipantMessageData.decode(octets[:length])
 
 
-@pytest.mark.parametrize("identifier", ["0002", "0003", "0007", "0009", "00ff"])
+@pytest.mark.parametrize(
+    ("octets", "data"),
+    [
+        ("00030000 c7bf8262d0e5b0d348fe97bb 00000001 00000000 00000000", b""),
+        ("00020000 c7bf8262d0e5b0d348fe97bb 00000001 00000001 61000000", b"a"),
+    ],
+)
+def test_what_fast_dds_calls_a_parameter_list_is_read_as_what_it_is(octets: str, data: bytes) -> None:
+    """The first is what Fast DDS 2.9.1 sends; the second its mirror."""
+    read = ParticipantMessageData.decode(bytes.fromhex(octets))
+    prefix = GuidPrefix(bytes.fromhex("c7bf8262d0e5b0d348fe97bb"))
+    assert read == ParticipantMessageData(prefix, AUTOMATIC_LIVELINESS_UPDATE, data)
+
+
+@pytest.mark.parametrize("identifier", ["0004", "0007", "0009", "000b", "00ff"])
 def test_other_encodings_are_malformed(identifier: str) -> None:
     octets = bytes.fromhex(identifier) + MESSAGES[0][0].encode()[2:]
     with pytest.raises(MalformedMessage):
