@@ -87,7 +87,7 @@ def envelopes(which: bytes, good: bytes, at: int, prefix: int, postfix: int) -> 
     yield "macs-4-billion", head + first + body + last[:20] + b"\xff" * 4 + last[24:], rejected
     yield "macs-fewer-than-octets", head + first + body + last[:20] + bytes(4) + bytes(20) + last[24:], rejected
     many = submessage(postfix, last[4:20] + (3000).to_bytes(4, "big") + bytes(60_000))
-    yield "macs-3000-of-nobody", head + first + body + many, rejected
+    yield "macs-3000-of-nobody", head + first + body + many, "NotForUs"
     yield "footer-of-4-octets", head + first + body + submessage(postfix, bytes(4)), rejected
     yield "key-unknown", head + first[:8] + b"\xde\xad\xbe\xef" + first[12:] + body + last, "NoKeys"
     yield "kind-none", head + first[:4] + bytes(4) + first[8:] + body + last, f"{rejected} ~ kind"

@@ -193,7 +193,7 @@ def sedp_reader() -> Iterator[Made]:
 def participant_messages() -> Iterator[Made]:
     yield "data-of-4-gigabytes", CDR_LE + Stranger().prefix + b"\0\0\0\1" + U32_MAX, MALFORMED
     yield "cut-off", CDR_LE + Stranger().prefix, MALFORMED
-    yield "parameter-list", PL_CDR_LE + bytes(24), MALFORMED
+    yield "said-to-be-a-parameter-list", PL_CDR_LE + bytes(24), "accepted"
 
 
 def samples() -> Iterator[Made]:
