@@ -29,7 +29,8 @@ demo: $(VENV)/.ready-to-run  ## Live data between processes, under a minute
 
 test: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers $(VENV)/.ready-to-lint  ## All tests; those with other stacks where these are installed
 	$(BIN)/python -m pytest $(IN_PARALLEL) $(wildcard tests) $(ARGS)
-	$(BIN)/python -m pytest $(TWO_AT_A_TIME) $(wildcard multiproc_tests) $(ARGS)
+	$(BIN)/python -m pytest $(TWO_AT_A_TIME) -m "not alone" $(wildcard multiproc_tests) $(ARGS)
+	$(BIN)/python -m pytest -m alone $(wildcard multiproc_tests) $(ARGS)
 
 quick: $(VENV)/.ready-to-test  ## The tests that take milliseconds, without other processes
 	$(BIN)/python -m pytest $(IN_PARALLEL) -m "not slow and not peers" tests $(ARGS)

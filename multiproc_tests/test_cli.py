@@ -246,11 +246,11 @@ async def test_shapes_types_and_qos_between_ours() -> None:
         async with scenario("late joiner", deadline=60) as stage:
             lasting = ["--transient-local", "--keep-last", "3"]
             publisher = await _ddsi(
-                stage, host, "shapes", "pub", *qos, *lasting, "-n", "40", "--rate", "20", "--at-end", "dispose"
+                stage, host, "shapes", "pub", *qos, *lasting, "-n", "100", "--rate", "20", "--at-end", "dispose"
             )
             for _ in range(10):
                 await publisher.expect(r"Triangle +BLUE .*")
-            subscriber = await _ddsi(stage, host, "shapes", "sub", *qos, *lasting, "--time", "6")
+            subscriber = await _ddsi(stage, host, "shapes", "sub", *qos, *lasting, "--time", "9")
             outside = await _ddsi(
                 stage, host, "shapes", "sub", "-d", "1", "-t", "Triangle", "--time", "5", name="outside"
             )
