@@ -36,8 +36,8 @@ class CacheChange:
     the change is meant for, GUID_UNKNOWN for everybody (the filtered path; DDS-Security 1.1 §7.4.4.4).
     ``fragment_octets`` is how large its writer cuts the fragments of a change that is too large for one message; it
     stays so, whatever size newer changes get.  ``related`` is who and which sample this one answers:
-    PID_RELATED_SAMPLE_IDENTITY's (Guid, number).  ``sealed`` is the payload as it was protected in one piece, for readers
-    that join fragments first: all its fragments must be of one and the same protection.
+    PID_RELATED_SAMPLE_IDENTITY's (Guid, number).  ``sealed`` is the payload as it was protected in one piece, for those
+    readers that join fragments first: all its fragments must be of one and the same protection.
     """
 
     __slots__ = (

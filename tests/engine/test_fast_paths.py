@@ -102,8 +102,9 @@ def _inline_qos(parameters: list[tuple[int, bytes]], *, little_endian: bool) -> 
     return inline if parameters else None
 
 
+no_parameters: list[tuple[int, bytes]] = []
 inline_qos = (
-    st.just([])
+    st.just(no_parameters)
     | st.just([(0x70, bytes(range(16)))])
     | st.lists(st.tuples(st.sampled_from([0x70, 0x71, 0x8123]), st.binary(max_size=20)), max_size=2)
 )

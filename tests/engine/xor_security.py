@@ -256,7 +256,7 @@ class XorSecurity(Plaintext):
     def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         sender = Guid(protected[4:20])
         if sender.prefix != source:
-            return Rejected(f"{sender} speaks as {source}")
+            return Rejected(f"{sender} speaks as {source.hex()}")
         is_kx = sender.entity_id in VOLATILE
         key = self._kx_key(source) if is_kx and source in self.peers else self.sender_keys.get(sender)
         plain = _open(protected, key)
