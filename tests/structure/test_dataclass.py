@@ -7,6 +7,7 @@ import dataclasses
 import inspect
 import math
 import pickle
+import sys
 from collections.abc import Callable
 from dataclasses import field, fields, replace
 from typing import Any
@@ -144,10 +145,13 @@ def test_what_is_not_compared_does_not_count() -> None:
     assert point(1) != OURS["Deeper"](1)
 
 
-@pytest.mark.parametrize("kinds", [OURS, THEIRS])
-def test_what_is_identical_is_equal_even_if_it_is_no_number(kinds: dict[str, type]) -> None:
-    point = kinds["Point"]
-    assert (point(1, math.nan) == point(1, math.nan)) == (THEIRS["Point"](1, math.nan) == THEIRS["Point"](1, math.nan))
+def test_what_is_identical_is_equal_even_if_it_is_no_number() -> None:
+    """As tuples compare.  The standard library's compare so too, until Python 3.13 let them ask each field."""
+    point = OURS["Point"]
+    assert point(1, math.nan) == point(1, math.nan)
+    assert point(1, math.nan) != point(1, float("nan"))
+    if sys.version_info < (3, 13):
+        assert THEIRS["Point"](1, math.nan) == THEIRS["Point"](1, math.nan)
 
 
 def test_values_are_pickled() -> None:
