@@ -63,7 +63,16 @@ class ConfigurationError(DdsError):
 
 
 class MalformedSample(DdsError):
-    """Octets that are not a sample of the type they were said to be."""
+    """Octets that are not a sample of the type they were said to be.
+
+    ``path`` is the member that was being read, as in ``pose.path[3].x``, and empty for the sample as a whole;
+    ``offset`` the octet in the payload, counted from its encapsulation header, and -1 where none is to blame.
+    """
+
+    def __init__(self, reason: str, *, path: str = "", offset: int = -1) -> None:
+        super().__init__(reason)
+        self.path = path
+        self.offset = offset
 
 
 class MalformedMessage(Exception):

@@ -104,7 +104,8 @@ class _CarefulReader:
     def fail(self, reason: str) -> NoReturn:
         path = "".join(self._path).lstrip(".")
         where = f"{path}: " if path else ""
-        raise MalformedSample(f"{self._type.type_name}: {where}{reason} (octet {self._position})")
+        message = f"{self._type.type_name}: {where}{reason} (octet {self._position})"
+        raise MalformedSample(message, path=path, offset=self._position)
 
     # --- octets ------------------------------------------------------------------------------------------
 
@@ -255,7 +256,7 @@ class _CarefulReader:
             return elements_value(type_, self._primitives(element, count))
         elements = []
         for index in range(count):
-            with self._at(f"[{index}]"):
+            with self._at(type_.place(index)):
                 elements.append(self._value(element))
         return elements_value(type_, elements)
 

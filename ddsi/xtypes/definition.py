@@ -20,6 +20,7 @@ from .annotations import HashId, MemberId, autoid_hash
 from .equality import same_members
 from .model import Extensibility, Member, StructType
 from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver
+from .topic_type import refuse_impossible
 from .value_check import check_value
 
 __all__ = ["define_struct", "own_annotations", "struct_type"]
@@ -66,7 +67,7 @@ def define_struct(
     )
     setattr(decorated, STRUCT_ATTRIBUTE, struct)
     with contextlib.suppress(NameError):  # a name not defined yet: found, or refused, at first use
-        _ = struct.members
+        refuse_impossible(struct)
     return decorated
 
 

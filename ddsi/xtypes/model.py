@@ -199,6 +199,10 @@ class SequenceType:
     bound: int | None = None
     numpy: bool = False
 
+    def place(self, index: int) -> str:
+        """How a path names an element."""
+        return f"[{index}]"
+
     def __str__(self) -> str:
         return f"sequence<{self.element}>" if self.bound is None else f"sequence<{self.element}, {self.bound}>"
 
@@ -218,6 +222,14 @@ class ArrayType:
         for dimension in self.dimensions:
             count *= dimension
         return count
+
+    def place(self, index: int) -> str:
+        """How a path names the element at an index that counts through all rows: ``[1][2]``."""
+        place = ""
+        for dimension in reversed(self.dimensions):
+            index, column = divmod(index, dimension)
+            place = f"[{column}]{place}"
+        return place
 
     def __str__(self) -> str:
         return str(self.element) + "".join(f"[{dimension}]" for dimension in self.dimensions)

@@ -19,7 +19,7 @@ from .model import (
 )
 from .recursion import DEEPEST_COLLECTION, is_recursive
 
-__all__ = ["complete", "default_representations"]
+__all__ = ["complete", "default_representations", "refuse_impossible"]
 
 XCDR1, XCDR2 = DataRepresentationId.XCDR1, DataRepresentationId.XCDR2
 
@@ -31,13 +31,20 @@ def complete(struct: StructType) -> StructType:
     """
     try:
         for inner in reachable_structs(struct):
-            _refuse_endless(inner)
-        for inner in reachable_structs(struct):
-            for member in inner.members:
-                _refuse_unfit_elements(inner, member)
+            refuse_impossible(inner)
     except NameError as error:
         raise BadParameter(f"{struct.type_name}: an annotation cannot be resolved: {error}") from error
     return struct
+
+
+def refuse_impossible(composite: Composite) -> None:
+    """Raise BadParameter, naming the member, where what the members are makes the type impossible.
+
+    ``NameError`` while that cannot be known, as one of them is not complete itself.
+    """
+    _refuse_endless(composite)
+    for member in composite.members:
+        _refuse_unfit_elements(composite, member)
 
 
 def _refuse_endless(struct: Composite) -> None:

@@ -33,6 +33,7 @@ from .model import (
     UnionType,
 )
 from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver
+from .topic_type import refuse_impossible
 
 __all__ = ["define_union", "selected_member", "union_type"]
 
@@ -76,7 +77,7 @@ def define_union(
     search.decorated = decorated
     setattr(decorated, STRUCT_ATTRIBUTE, union)
     with contextlib.suppress(NameError):  # a name not defined yet: found, or refused, at first use
-        _ = union.members
+        refuse_impossible(union)
     return decorated
 
 

@@ -169,7 +169,7 @@ def _check_sequence(type_: SequenceType, value: Any, path: str, depth: int) -> N
     count = _count(type_, value, path)
     if type_.bound is not None and count > type_.bound:
         raise BadParameter(f"{path}: {count} elements exceed the bound of {type_.bound}")
-    _check_elements(type_.element, value, path, depth)
+    _check_elements(type_, value, path, depth)
 
 
 def _check_array(type_: ArrayType, value: Any, path: str, depth: int) -> None:
@@ -179,7 +179,7 @@ def _check_array(type_: ArrayType, value: Any, path: str, depth: int) -> None:
         flat = flatten(value, type_.dimensions)
     if flat is None or _number_of_elements(flat) != type_.count:
         raise BadParameter(f"{path}: {_shape(value)} elements where the array has {_times(type_.dimensions)}")
-    _check_elements(type_.element, flat, path, depth)
+    _check_elements(type_, flat, path, depth)
 
 
 def _count(type_: SequenceType | ArrayType, value: Any, path: str) -> int:
@@ -192,7 +192,8 @@ def _count(type_: SequenceType | ArrayType, value: Any, path: str) -> int:
     return _number_of_elements(value) if octets_expected else len(value)
 
 
-def _check_elements(element: IdlType, value: Any, path: str, depth: int) -> None:
+def _check_elements(type_: SequenceType | ArrayType, value: Any, path: str, depth: int) -> None:
+    element = type_.element
     if isinstance(element, Primitive) and element.is_octet:
         try:
             octets(value)
@@ -204,7 +205,7 @@ def _check_elements(element: IdlType, value: Any, path: str, depth: int) -> None
         if not view.c_contiguous or view.format not in "bBhHiIlLqQfd":
             raise BadParameter(f"{path}: a buffer of format {view.format!r} does not hold {element}")
     for index, item in enumerate(value.tolist() if hasattr(value, "tolist") else value):
-        _check(element, item, f"{path}[{index}]", depth)
+        _check(element, item, f"{path}{type_.place(index)}", depth)
 
 
 def _check_struct(type_: StructType, value: Any, path: str, depth: int) -> None:

@@ -240,9 +240,11 @@ def test_a_struct_may_be_empty_but_no_element_of_a_sequence() -> None:
     empty: type[Any] = idl.struct(type("Empty", (), {}))
     holder: type[Any] = idl.struct(type("Holder", (), {"__annotations__": {"e": empty, "n": idl.int32}}))
     assert deserialize(holder, serialize(holder(empty(), 3))) == holder(empty(), 3)
-    many: type[Any] = idl.struct(type("Many", (), {"__annotations__": {"es": idl.sequence[empty]}}))  # type: ignore[valid-type]
+    many: Any = {"es": idl.sequence[empty]}  # type: ignore[valid-type]
     with pytest.raises(BadParameter, match=r"Many\.es: its elements are of Empty, which has no members"):
-        serialize(many([]))
+        idl.struct(type("Many", (), {"__annotations__": many}))
+    with pytest.raises(BadParameter, match=r"Choice\.es: its elements are of Empty, which has no members"):
+        idl.union(type("Choice", (), {"k": idl.switch, "es": idl.case(1), "__annotations__": {"k": idl.int8, **many}}))
 
 
 def _same_id() -> None:
@@ -366,7 +368,15 @@ def test_a_name_that_never_comes_is_refused_at_first_use() -> None:
         type_support(Waiting)
 
 
-def test_a_struct_that_holds_itself_by_value_is_refused_at_first_use() -> None:
+def test_a_struct_that_holds_itself_by_value_is_refused() -> None:
+    with pytest.raises(BadParameter, match=r"Itself\.again: Itself would contain itself without end"):
+
+        @idl.struct
+        class Itself:
+            again: Annotated[idl.sequence[Itself], idl.array(2)]
+
+
+def test_structs_that_hold_each_other_by_value_are_refused_at_first_use() -> None:
     @idl.struct
     class Endless:
         inner: Middle

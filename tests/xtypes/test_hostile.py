@@ -165,8 +165,21 @@ def test_values_outside_their_type_are_malformed_with_member_and_offset(name: st
     class_: Any = idl.struct(type("Victim", (), {"__annotations__": {"before": idl.octet, "it": annotation}}))
     aligned = "ff" if name == "boolean" else "ff000000"
     payload = bytes.fromhex("00010000" + aligned + octets)
-    with pytest.raises(MalformedSample, match=r"Victim: " + re.escape(reason) + r".*\(octet \d+\)"):
+    with pytest.raises(MalformedSample, match=r"Victim: " + re.escape(reason) + r".*\(octet \d+\)") as malformed:
         deserialize(class_, payload)
+    assert malformed.value.path == reason.partition(":")[0]
+    assert len(payload) - len(bytes.fromhex(octets)) <= malformed.value.offset <= len(payload)
+
+
+def test_an_element_of_an_array_is_named_by_all_its_indices() -> None:
+    @idl.struct
+    class Table:
+        names: Annotated[idl.sequence[idl.sequence[str]], idl.array(2, 3)]
+
+    octets = serialize(Table([["a", "b", "c"], ["d", "e", "f"]]))
+    with pytest.raises(MalformedSample, match=r"a string without its terminating NUL") as malformed:
+        deserialize(Table, octets.replace(b"e\0", b"e!"))
+    assert malformed.value.path == "names[1][1]"
 
 
 def test_a_string_of_length_zero_is_empty() -> None:

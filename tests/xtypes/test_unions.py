@@ -218,7 +218,5 @@ def test_malformed_unions_maps_and_wide_strings_are_refused() -> None:
 def test_a_union_that_holds_itself_by_default_has_no_end() -> None:
     annotations = {"d": idl.int32, "again": "Endless"}
     namespace = {"d": idl.switch, "again": idl.case(default=True), "__annotations__": annotations}
-    endless: type[Any] = idl.union(type("Endless", (), namespace))
-    holder: type[Any] = idl.struct(type("Holder", (), {"__annotations__": {"u": endless}}))
-    with pytest.raises(BadParameter, match="Endless would contain itself without end"):
-        serialize(holder(None))
+    with pytest.raises(BadParameter, match=r"Endless\.again: Endless would contain itself without end"):
+        idl.union(type("Endless", (), namespace))

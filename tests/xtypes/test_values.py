@@ -252,7 +252,7 @@ UNFIT: list[tuple[dict[str, Any], str]] = [
     ({"pose": Pose(Point(), [None])}, "pose.path[0]: None is no Point"),  # type: ignore[list-item]
     ({"pose": Pose(None, [])}, "pose.position: None is no Point"),  # type: ignore[arg-type]
     ({"grid": [[1, 2], [3]]}, "grid: 2 elements where the array has 2x2"),
-    ({"grid": [[1, 2], [3, 70000]]}, "grid[3]: 70000 does not fit int16"),
+    ({"grid": [[1, 2], [3, 70000]]}, "grid[1][1]: 70000 does not fit int16"),
     ({"grid": np.zeros((4, 1), "i2")}, "grid: 4x1 elements where the array has 2x2"),
     ({"four": b"abc"}, "four: 3 elements where the array has 4"),
     ({"names": ["a"]}, "names: 1 elements where the array has 2"),
@@ -262,7 +262,7 @@ UNFIT: list[tuple[dict[str, Any], str]] = [
     ({"chars": {"a": 1}}, "chars: {'a': 1} is no sequence of char"),
     ({"code": "abc"}, "code: 3 elements where the array has 2"),
     ({"code": {"a": 1, "b": 2}}, "code: {'a': 1, 'b': 2} is no sequence of char"),
-    ({"board": [["x", "y"], ["x", "yz"]]}, "board[3]: 'yz' is no wchar"),
+    ({"board": [["x", "y"], ["x", "yz"]]}, "board[1][1]: 'yz' is no wchar"),
     ({"flat": [True]}, "flat: 1 elements where the array has 2"),
 ]
 
