@@ -36,9 +36,11 @@ from ..structure.status import SecurityRefused, SecurityRevoked
 from ..transport import Pump, PumpOptions
 from .entity import Entity, Parent, deadline_scope
 from .lifetime import Lifetime
+from .type_access import AnnouncedEndpoint, fetch_type_object, fetch_type_objects
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
+    from ..xtypes.type_object import BuiltTypes, TypeIdentifier, TypeObject
 
 __all__ = ["DomainParticipant"]
 
@@ -199,6 +201,24 @@ class DomainParticipant(Parent):
     def discovered_subscriptions(self) -> list[DiscoveredReaderData]:
         """The remote readers that are known now."""
         return list(self._running_pump().engine.known_readers.all())
+
+    async def type_objects(self, endpoint: AnnouncedEndpoint, *, timeout: float | None = 10.0) -> BuiltTypes:
+        """What the type of a remote writer or reader is made of: its TypeObject, complete where the peer has that, and
+        those of all types that it needs; from the endpoint's participant where they are not known yet.
+
+        Raises PreconditionNotMet, saying why, where there is nothing to be had (the endpoint announces no type
+        information, or its participant does not know or does not answer), and DdsTimeout after ``timeout`` seconds.
+
+        DDS-XTypes 1.3 §7.6.3.3.  See ``dcps/type_access.py`` for an example.
+        """
+        return await fetch_type_objects(self, endpoint, timeout)
+
+    async def type_object(self, identifier: TypeIdentifier, owner: Guid, *, timeout: float | None = 10.0) -> TypeObject:
+        """One TypeObject; ``owner`` is the participant, or an endpoint of it, that is asked where it is not known yet.
+
+        Raises as :meth:`type_objects` does, and BadParameter for an identifier that stands for no TypeObject.
+        """
+        return await fetch_type_object(self, identifier, owner, timeout)
 
     def knows_all_announced(self) -> bool:
         """Has every endpoint come that the participants known now had when they were discovered?

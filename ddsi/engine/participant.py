@@ -69,6 +69,7 @@ from .matchmaker import Matchmaker
 from .outbound import Outbound, fragment_octets_for
 from .recorder import Recorder
 from .timeliness import Timeliness
+from .type_lookup import TypeLookup
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
@@ -165,6 +166,7 @@ class Participant:
         self.timeliness = Timeliness(self)
         self.admission = AdmissionDesk(self)
         self.builtin_readers = BuiltinTopicReaders(self)
+        self.types = TypeLookup(self)
         try:
             self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
             self.builtin = BuiltinTopics(self)

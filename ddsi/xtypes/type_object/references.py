@@ -1,0 +1,68 @@
+"""Which other TypeObjects a TypeObject needs: the identifiers with a hash that it names (DDS-XTypes 1.3 §7.3.4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .identifiers import (
+    ArrayIdentifier,
+    ComponentIdentifier,
+    HashedIdentifier,
+    HashIdentifier,
+    MapIdentifier,
+    SequenceIdentifier,
+    TypeIdentifier,
+)
+from .objects import (
+    AliasObject,
+    ArrayObject,
+    MapObject,
+    SequenceObject,
+    StructObject,
+    TypeObject,
+    UnionObject,
+)
+
+__all__ = ["hashes_in", "references"]
+
+
+def references(type_object: TypeObject) -> Iterator[HashedIdentifier]:
+    """In the order in which it names them; one that is named twice comes twice."""
+    for identifier in _named(type_object):
+        yield from hashes_in(identifier)
+
+
+def hashes_in(identifier: TypeIdentifier) -> Iterator[HashedIdentifier]:
+    """The identifier itself where it is a hash, or those inside a collection's."""
+    match identifier:
+        case HashIdentifier() | ComponentIdentifier():
+            yield identifier
+        case SequenceIdentifier(element=element) | ArrayIdentifier(element=element):
+            yield from hashes_in(element)
+        case MapIdentifier(key=key, element=element):
+            yield from hashes_in(key)
+            yield from hashes_in(element)
+        case _:
+            pass
+
+
+def _named(type_object: TypeObject) -> Iterator[TypeIdentifier]:
+    match type_object.body:
+        case StructObject(base=base, members=members):
+            if base is not None:
+                yield base
+            for member in members:
+                yield member.type
+        case UnionObject(discriminator=discriminator, cases=cases):
+            yield discriminator
+            for case in cases:
+                yield case.type
+        case AliasObject(related=related):
+            yield related
+        case SequenceObject(element=element) | ArrayObject(element=element):
+            yield element
+        case MapObject(key=key, element=element):
+            yield key
+            yield element
+        case _:
+            pass
