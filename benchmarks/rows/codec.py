@@ -1,6 +1,7 @@
 """Codec: a sample to octets and back, in one process, without a participant.
 
-Both stacks are given octets in the form that is quickest for each: ``bytes``.
+Both stacks are given values in the form that is quickest for each: octets as ``bytes``, a megabyte of numbers as a
+numpy array here and as a list there.
 """
 
 from __future__ import annotations
@@ -12,13 +13,24 @@ from benchmarks.session import Session
 
 __all__ = ["BENCHMARKS"]
 
-# Octets beside the index (0: a ShapeType), and operations in a round: some tenths of a second on the slower side.
-_SAMPLES = {"shape": (0, 20_000), "1KiB": (1 << 10, 5_000), "64KiB": (1 << 16, 100), "1MiB": (1 << 20, 8)}
+# What it is, and operations in a round: some tenths of a second on the slower side.
+_SAMPLES = {
+    "shape": ("ShapeType", 20_000),
+    "1KiB": ("1 KiB of octets", 5_000),
+    "64KiB": ("64 KiB of octets", 100),
+    "1MiB": ("1 MiB of octets", 8),
+    "points": ("a header and 100 points", 500),
+    "mutable": ("a mutable struct", 10_000),
+    "union": ("a union in a struct", 20_000),
+    "structs": ("1,000 structs of numbers", 50),
+    "named-structs": ("1,000 structs of numbers and a string", 50),
+    "float64": ("1 MiB of float64, numpy", 50),
+}
 
 
-def _measure(role: str, name: str, octets: int, count: int) -> Callable[[Side, Session], Mapping[str, float]]:
+def _measure(role: str, name: str, label: str, count: int) -> Callable[[Side, Session], Mapping[str, float]]:
     def measure(side: Side, session: Session) -> Mapping[str, float]:
-        worker = session.start(side, role, octets=octets, count=session.count(count))
+        worker = session.start_module(f"{side.module}_codec", role, name=label, count=session.count(count))
         return {name: worker.result()["us"]}
 
     return measure
@@ -27,11 +39,11 @@ def _measure(role: str, name: str, octets: int, count: int) -> Callable[[Side, S
 BENCHMARKS = tuple(
     Benchmark(
         name := f"{role}/{label}",
-        f"{role} one sample ({'ShapeType' if not octets else f'{label} of octets'})",
+        f"{role} one sample ({what})",
         (Figure(name, "us", Better.LOWER),),
-        _measure(role, name, octets, count),
+        _measure(role, name, label, count),
         (OURS, PEER, FLOOR),
     )
     for role in ("serialise", "deserialise")
-    for label, (octets, count) in _SAMPLES.items()
+    for label, (what, count) in _SAMPLES.items()
 )

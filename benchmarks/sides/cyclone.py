@@ -62,28 +62,6 @@ def maker_of(octets: int) -> Callable[[int], Any]:
     return lambda number: ShapeType("BLUE", number, 20, 30)
 
 
-# --- codec -----------------------------------------------------------------------------------------------
-
-
-def serialise(octets: int, count: int) -> dict[str, float]:
-    sample = maker_of(octets)(7)
-    sample.serialize()
-    start = time.perf_counter()
-    for _ in range(count):
-        sample.serialize()
-    return {"us": (time.perf_counter() - start) / count * 1e6}
-
-
-def deserialise(octets: int, count: int) -> dict[str, float]:
-    kind = kind_of(octets)
-    data = maker_of(octets)(7).serialize()
-    kind.deserialize(data)
-    start = time.perf_counter()
-    for _ in range(count):
-        kind.deserialize(data)
-    return {"us": (time.perf_counter() - start) / count * 1e6}
-
-
 # --- throughput ------------------------------------------------------------------------------------------
 
 
@@ -235,8 +213,6 @@ def watch(domain: int) -> dict[str, float]:
 if __name__ == "__main__":
     play(
         {
-            "serialise": serialise,
-            "deserialise": deserialise,
             "receive": receive,
             "send": send,
             "echo": echo,

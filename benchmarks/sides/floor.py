@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import trio
 
 from .memory import resident_mib
-from .protocol import PAYLOAD_BYTE, play, say_ready, summarise_round_trips
+from .protocol import play, say_ready, summarise_round_trips
 
 _OCTETS = b"\0" * 128  # about as much as the RTPS message of one ShapeType
 _WARM_UP = 100
@@ -127,34 +126,6 @@ def _batches(octets: int, count: int) -> Iterator[int]:
         yield min(batch, datagrams - first)
 
 
-# --- codec -----------------------------------------------------------------------------------------------
-
-_SHAPE = struct.Struct("<4xI5s3xiii")
-
-
-def serialise(octets: int, count: int) -> dict[str, float]:
-    """One copy; of a ShapeType, what `struct` makes of its members."""
-    if octets:
-        payload = PAYLOAD_BYTE * octets
-        return _microseconds(lambda: bytearray(payload), count)
-    return _microseconds(lambda: _SHAPE.pack(5, b"BLUE", 7, 20, 30), count)
-
-
-def deserialise(octets: int, count: int) -> dict[str, float]:
-    if octets:
-        return serialise(octets, count)
-    data = _SHAPE.pack(5, b"BLUE", 7, 20, 30)
-    return _microseconds(lambda: _SHAPE.unpack(data), count)
-
-
-def _microseconds(operation: Callable[[], object], count: int) -> dict[str, float]:
-    operation()
-    start = time.perf_counter()
-    for _ in range(count):
-        operation()
-    return {"us": (time.perf_counter() - start) / count * 1e6}
-
-
 # --- one process -----------------------------------------------------------------------------------------
 
 
@@ -197,8 +168,6 @@ if __name__ == "__main__":
             "ping": ping,
             "receive": receive,
             "send": send,
-            "serialise": serialise,
-            "deserialise": deserialise,
             "checkpoint": checkpoint,
             "datagram": datagram,
             "idle": idle,

@@ -49,28 +49,6 @@ def maker_of(octets: int) -> Callable[[int], Sample]:
     return lambda number: ShapeType("BLUE", number, 20, 30)
 
 
-# --- codec -----------------------------------------------------------------------------------------------
-
-
-def serialise(octets: int, count: int) -> dict[str, float]:
-    sample = maker_of(octets)(7)
-    ddsi.serialize(sample, representation=ddsi.XCDR1)
-    start = time.perf_counter()
-    for _ in range(count):
-        ddsi.serialize(sample, representation=ddsi.XCDR1)
-    return {"us": (time.perf_counter() - start) / count * 1e6}
-
-
-def deserialise(octets: int, count: int) -> dict[str, float]:
-    kind = kind_of(octets)
-    data = ddsi.serialize(maker_of(octets)(7), representation=ddsi.XCDR1)
-    ddsi.deserialize(kind, data)
-    start = time.perf_counter()
-    for _ in range(count):
-        ddsi.deserialize(kind, data)
-    return {"us": (time.perf_counter() - start) / count * 1e6}
-
-
 # --- throughput ------------------------------------------------------------------------------------------
 
 
@@ -238,8 +216,6 @@ def _run(role: Callable[..., Awaitable[dict[str, float] | None]]) -> Callable[..
 if __name__ == "__main__":
     play(
         {
-            "serialise": serialise,
-            "deserialise": deserialise,
             "receive": _run(receive),
             "send": _run(send),
             "echo": _run(echo),
