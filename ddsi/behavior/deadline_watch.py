@@ -7,6 +7,7 @@ that order is enough, and a sample costs a move in it and no timer.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 __all__ = ["DeadlineWatch"]
 
@@ -22,6 +23,24 @@ class DeadlineWatch:
         self._period = max(period, _SHORTEST_PERIOD_S)
         self._heard_at: dict[bytes, float] = {}
         self.due = math.inf
+
+    @classmethod
+    def anew(
+        cls, before: DeadlineWatch | None, period: float, keys: Iterable[bytes], now: float
+    ) -> DeadlineWatch | None:
+        """The watch for a policy that may have changed; None: there is no deadline.
+
+        Where it has, the period of each instance begins now.  ``keys``: the instances that are expected where nobody
+        watched ``before``.
+        """
+        if period == math.inf:
+            return None
+        watch = cls(period)
+        if before is not None and before._period == watch._period:
+            return before
+        for key in before._heard_at if before is not None else keys:
+            watch.heard(key, now)
+        return watch
 
     def heard(self, key: bytes, now: float) -> None:
         """A sample of the instance was written, or came: its period begins anew."""

@@ -100,6 +100,11 @@ class ReaderHistoryCache:
         """The known instances by key.  For looking up only."""
         return self._instances
 
+    def qos_changed(self, qos: EndpointQos, now: float) -> None:
+        """The reader's policies, as far as they may change, are now these.  DDS 1.4 §2.2.3."""
+        alive = [instance.key for instance in self._instances.values() if instance.state is _ALIVE]
+        self._gate.qos_changed(qos, alive, now)
+
     # --- what comes in -----------------------------------------------------------------------------------
 
     def add(self, change: CacheChange, now: float) -> bool:

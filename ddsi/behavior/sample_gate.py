@@ -56,7 +56,17 @@ class SampleGate:
         self._expiries: list[tuple[float, int, SampleInfo]] = []
         self._expiry_count = 0
         self._timer_due = math.inf
-        self.is_open = self._owners is None and self._separation == 0 and self._deadline is None
+        self._may_be_open()
+
+    def _may_be_open(self) -> None:
+        self.is_open = self._owners is None and self._separation == 0 and self._deadline is None and not self._lifespans
+
+    def qos_changed(self, qos: EndpointQos, alive: Iterable[bytes], now: float) -> None:
+        """Policies that may change have changed; ``alive``: the instances of which samples are to be expected."""
+        self._separation = qos.time_based_filter.minimum_separation
+        self._deadline = DeadlineWatch.anew(self._deadline, qos.deadline.period, alive, now)
+        self._may_be_open()
+        self.arm()
 
     # --- the writers -------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ else it misses, so there is no second path for late joiners.
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections import deque
 
@@ -77,7 +78,7 @@ class StatefulWriter:
         # What was sent and not acknowledged by the readers that still answer: (number, octets), ascending.
         self._in_flight: deque[tuple[int, int]] = deque()
         self._in_flight_octets = 0
-        self._expiries: deque[tuple[float, int]] = deque()
+        self._expiries: list[tuple[float, int]] = []  # a heap: the lifespan may change, so a later sample ends earlier
         self.deadline = DeadlineWatch(qos.deadline.period) if qos.deadline.period < math.inf else None
 
     def __repr__(self) -> str:
@@ -90,6 +91,11 @@ class StatefulWriter:
         return self._in_flight_octets
 
     # --- the application's side --------------------------------------------------------------------------
+
+    def qos_changed(self, qos: EndpointQos, now: float) -> None:
+        """Policies that may change have changed; DDS 1.4 §2.2.3.  What is in the history keeps its LIFESPAN."""
+        self.deadline = DeadlineWatch.anew(self.deadline, qos.deadline.period, self.cache.instances(), now)
+        self.qos = qos
 
     @property
     def needs_key(self) -> bool:
@@ -140,7 +146,7 @@ class StatefulWriter:
         cache.add(change)
         if lifespan != math.inf and kind is ChangeKind.ALIVE:  # DDS 1.4 §2.2.3.16: data expires, not the end of it
             change.expiry = now + lifespan
-            self._expiries.append((change.expiry, change.sequence_number))
+            heapq.heappush(self._expiries, (change.expiry, change.sequence_number))
         if self.deadline is not None:
             self._expected(kind, key, now)
         if self._reliable_readers:
@@ -384,7 +390,7 @@ class StatefulWriter:
     def handle_timeout(self, now: float) -> list[WriterTransmission]:
         out: list[WriterTransmission] = []
         while self._expiries and self._expiries[0][0] <= now:
-            self._expire(self._expiries.popleft()[1])
+            self._expire(heapq.heappop(self._expiries)[1])
         if self._pace_due <= now:
             self._pace_due = math.inf
             out.extend(self.unsent_changes(now))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import field, replace
+from typing import ClassVar
 
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import StatefulReader
@@ -56,6 +57,8 @@ class KeyCodec:
 
 class LocalWriter:
     """A DataWriter of this participant (or one of its builtin writers)."""
+
+    KIND: ClassVar[str] = "writer"
 
     __slots__ = (
         "assertion_due",
@@ -135,6 +138,8 @@ class LocalWriter:
 @dataclass(slots=True)
 class LocalReader:
     """A DataReader of this participant.  ``history`` is the behavior's change sink."""
+
+    KIND: ClassVar[str] = "reader"
 
     data: DiscoveredReaderData
     behavior: StatefulReader

@@ -176,7 +176,11 @@ class Matchmaker:
             if self._refused(writer.guid, reader.guid, writer.data.topic_name, refusal):
                 self._tell(writer, reader.data, refusal)
                 self._tell(reader, writer.data, refusal)
-        elif not matched and writer.guid not in self._engine.closing:
+        elif matched:
+            writer.behavior.local_readers[reader.guid].data = reader.data
+            reader.behavior.writers[writer.guid].data = writer.data
+            _tell_history(reader, writer.data)
+        elif writer.guid not in self._engine.closing:
             self._match_local(writer, reader, now)
 
     def _match_reader(self, writer: LocalWriter, data: DiscoveredReaderData, now: float) -> None:

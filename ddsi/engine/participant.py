@@ -67,6 +67,7 @@ from .liveliness import Liveliness
 from .local_endpoints import KeyCodec, LocalReader, LocalWriter
 from .matchmaker import Matchmaker
 from .outbound import Outbound, fragment_octets_for
+from .qos_changes import QosChanges
 from .recorder import Recorder
 from .timeliness import Timeliness
 from .type_lookup import TypeLookup
@@ -162,6 +163,7 @@ class Participant:
         self.outbound = Outbound(header, setup.max_message_octets, setup.config.fragment_size, hooks, emit)
         self.inbound = Inbound(self)
         self.matchmaker = Matchmaker(self)
+        self.qos_changes = QosChanges(self)
         self.liveliness = Liveliness(self)
         self.timeliness = Timeliness(self)
         self.admission = AdmissionDesk(self)

@@ -18,6 +18,7 @@ from ..engine.recorder import Recorder
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.errors import MalformedSample
 from ..structure.guid import GUID_UNKNOWN, Guid
+from ..structure.qos import Qos, reader_qos, writer_qos
 from ..structure.sample_info import SampleInfo
 from ..trace.sink import TraceSink
 
@@ -94,6 +95,11 @@ class NodeWriter:
         node.pump()
         return change
 
+    def change(self, qos: Qos) -> None:
+        """Change policies: what ``qos`` does not set becomes the default.  Raises as applications are refused."""
+        self.node.engine.qos_changes.change_writer(self.local, writer_qos(qos), self.node.now)
+        self.node.pump()
+
     def delete(self) -> None:
         """Delete the writer, politely: it lingers for what is not acknowledged."""
         self.is_deleted = True
@@ -160,6 +166,11 @@ class NodeReader:
         self.takes = True
         while self.take():
             pass
+
+    def change(self, qos: Qos) -> None:
+        """Change policies: what ``qos`` does not set becomes the default.  Raises as applications are refused."""
+        self.node.engine.qos_changes.change_reader(self.local, reader_qos(qos), self.node.now)
+        self.node.pump()
 
     def delete(self) -> None:
         self.is_deleted = True
