@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 from ...structure.dataclass import dataclass
 from ...structure.errors import BadParameter
+from ..components import strongly_connected
 from ..model import (
     ArrayType,
     BitmaskType,
@@ -30,7 +31,6 @@ from ..model import (
     Typedefs,
     UnionType,
 )
-from .components import strongly_connected
 from .encoding import encode_type_object, hash_of_objects, hashed
 from .identifiers import (
     HASH_LENGTH,

@@ -79,6 +79,13 @@ class ObjectReader(Reader):
             raise self.malformed(f"a sequence of {count} elements in {self.remaining} octets")
         return count
 
+    def delimited_octets(self) -> memoryview:
+        """An object that is to be looked into later, its DHEADER included; not copied."""
+        self.align(4)
+        begin = self.position
+        self.skip_delimited()
+        return self._octets[begin : self.position]
+
     def skip_delimited(self) -> None:
         """An object that is of no interest."""
         with self.delimited():

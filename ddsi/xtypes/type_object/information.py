@@ -12,7 +12,15 @@ from .cursors import ObjectReader, ObjectWriter
 from .identifiers import PrimitiveIdentifier, TypeIdentifier, read_identifier, write_identifier
 from .kinds import TypeKind
 
-__all__ = ["IdentifiedTypes", "SizedIdentifier", "TypeInformation", "decode_type_information", "information_of"]
+__all__ = [
+    "IdentifiedTypes",
+    "SizedIdentifier",
+    "TypeInformation",
+    "decode_type_information",
+    "information_of",
+    "read_sized",
+    "write_sized",
+]
 
 MOST_DEPENDENCIES = 1024
 """How many a peer may list; those beyond are not looked at."""
@@ -103,15 +111,15 @@ def _identified(types: BuiltTypes) -> IdentifiedTypes:
 
 
 def _write_types(writer: ObjectWriter, types: IdentifiedTypes) -> None:
-    _write_sized(writer, types.type)
+    write_sized(writer, types.type)
     writer.i32(types.dependency_count)
     with writer.delimited():
         writer.u32(len(types.dependencies))
         for dependency in types.dependencies:
-            _write_sized(writer, dependency)
+            write_sized(writer, dependency)
 
 
-def _write_sized(writer: ObjectWriter, sized: SizedIdentifier) -> None:
+def write_sized(writer: ObjectWriter, sized: SizedIdentifier) -> None:
     with writer.delimited():
         write_identifier(writer, sized.identifier)
         writer.u32(sized.size)
@@ -122,15 +130,15 @@ def _write_sized(writer: ObjectWriter, sized: SizedIdentifier) -> None:
 
 def _read_types(reader: ObjectReader) -> IdentifiedTypes:
     with reader.delimited():
-        type_ = _read_sized(reader)
+        type_ = read_sized(reader)
         dependency_count = reader.i32()
         with reader.delimited():
             count = reader.count(least_octets=9)  # DHEADER, an identifier of one octet, the size
-            dependencies = tuple(_read_sized(reader) for _ in range(min(count, MOST_DEPENDENCIES)))
+            dependencies = tuple(read_sized(reader) for _ in range(min(count, MOST_DEPENDENCIES)))
     return IdentifiedTypes(type_, dependency_count, dependencies)
 
 
-def _read_sized(reader: ObjectReader) -> SizedIdentifier:
+def read_sized(reader: ObjectReader) -> SizedIdentifier:
     with reader.delimited():
         return SizedIdentifier(read_identifier(reader), reader.u32())
 
