@@ -107,7 +107,7 @@ def test_a_length_before_the_dheader_is_taken_too() -> None:
 def test_members_of_later_versions_are_skipped() -> None:
     begin = REQUEST.index(bytes.fromhex("23000000d3528201"))
     longer = REQUEST[:begin] + bytes.fromhex(
-        "2f000000d35282012700000001000020aabbccdd0200000000000000"
+        "33000000d35282012b00000001000020aabbccdd0200000000000000"
         "6560535c1300000001000000f150ebb00f2395af1aa3e2648032d100"
     )  # fmt: skip
     assert decode_request(longer) == REQUESTS[0]
