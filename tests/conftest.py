@@ -1,10 +1,14 @@
-"""What holds for every test: whatever it starts stays on the loopback interface, and hypothesis repeats itself."""
+"""What holds for every test: it stays on loopback, hypothesis repeats itself, a missing peer fails where required."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Generator
 
+import pytest
 from hypothesis import HealthCheck, settings
+
+from .peers import peer_must_be_there
 
 LOOPBACK = '<DDSI><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></DDSI>'
 
@@ -16,3 +20,12 @@ os.environ["CYCLONEDDS_URI"] = LOOPBACK.replace("DDSI>", "CycloneDDS>")
 # The same examples on every run, so that a failure can be repeated; no deadline, as machines differ in speed.
 settings.register_profile("ddsi", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("ddsi")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if report.skipped and item.get_closest_marker("peers") is not None and peer_must_be_there():
+        report.outcome = "failed"
+        report.longrepr = f"required, but unavailable: {report.longrepr}"
+    return report

@@ -153,13 +153,7 @@ class ValueReader:
         if type_.bound is not None:
             emitter.refuse(f"{count} > {type_.bound}")
         emitter.flush()
-        behind_count = emitter.residue
-        if self._encoding.alignment(element.size) == 8 and emitter.residue.padding(8) != 0:
-            name = self._source.fresh("p")
-            padding = emitter.residue.padding(8)
-            expression = f"(-({emitter.position} - {emitter.origin}) & 7)" if padding is None else str(padding)
-            emitter.then(f"{name} = {emitter.position} + ({expression} if {count} else 0)")
-            emitter.move(name, behind_count.meet(ALIGNED))
+        self._align_elements(element.size, count)
         start = emitter.position
         residue = emitter.residue.advance_multiple(element.size)
         end = self._source.fresh("e")
@@ -167,6 +161,18 @@ class ValueReader:
         value = self._primitives(type_, element, start, end)
         emitter.move(end, residue)
         return value
+
+    def _align_elements(self, size: int, count: str) -> None:
+        """In XCDR1 padding to 8 lies between count and elements, unless there are none (measured: s05)."""
+        emitter = self._emitter
+        residue = emitter.residue
+        padding = residue.padding(8)
+        if self._encoding.alignment(size) != 8 or padding == 0:
+            return
+        name = self._source.fresh("p")
+        expression = f"(-({emitter.position} - {emitter.origin}) & 7)" if padding is None else str(padding)
+        emitter.then(f"{name} = {emitter.position} + ({expression} if {count} else 0)")
+        emitter.move(name, residue.meet(ALIGNED))
 
     def _primitives(self, type_: SequenceType | ArrayType, element: Primitive, start: str, end: str) -> str:
         """The elements between two indices.  Where a slice comes out short, the position tells in the end."""
@@ -280,7 +286,10 @@ class ValueReader:
 
     def _enumeration_elements(self, element: EnumType | BitmaskType | BitsetType, count: str, value: str) -> None:
         emitter = self._emitter
-        emitter.align(self._encoding.alignment(element.size))
+        if self._encoding.alignment(element.size) == 8:
+            self._align_elements(element.size, count)
+        else:
+            emitter.align(self._encoding.alignment(element.size))
         if isinstance(element, EnumType):
             make = f"{self._enum_table(element)}.__getitem__"
         else:

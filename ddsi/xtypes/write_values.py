@@ -249,7 +249,10 @@ class ValueWriter:
     def _elements(self, type_: IdlType, element: IdlType, value: str, count: str) -> None:
         emitter, encoding = self._emitter, self._encoding
         if isinstance(element, (EnumType, BitmaskType, BitsetType)):
-            emitter.align(encoding.alignment(element.size))
+            if isinstance(type_, SequenceType) and encoding.alignment(element.size) == 8:
+                self._align_elements(count)
+            else:
+                emitter.align(encoding.alignment(element.size))
             residue = emitter.position.residue.advance_multiple(element.size)
             octets = f"{count} * {element.size}"
             emitter.part(f"pack_numbers('{encoding.order}', '{element.code}', {value})", octets, residue)

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from ddsi.structure.qos_policies import DataRepresentationId
 from ddsi.xtypes import deserialize, idl, serialize
 
-peers = pytest.importorskip("tests.xtypes.cyclone_types", reason="cyclonedds-python is not installed")
+from ..peers import peer_module
+
+peers = peer_module("tests.xtypes.cyclone_types", "cyclonedds-python is not installed")
 
 pytestmark = pytest.mark.peers
 
