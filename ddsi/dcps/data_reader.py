@@ -27,6 +27,7 @@ from ..structure.status import (
     Status,
     SubscriptionMatched,
 )
+from .endpoint import Endpoint, QosPlan
 from .entity import deadline_scope
 from .groups import Subscriber, check_family
 from .sample import Sample
@@ -43,7 +44,7 @@ T = TypeVar("T")
 _LOOK_FOR_HISTORY_S = 0.005
 
 
-class DataReader(SampleReader[T]):
+class DataReader(SampleReader[T], Endpoint):
     """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``, which never wait."""
 
     STATUSES: ClassVar[tuple[type, ...]] = (
@@ -63,15 +64,14 @@ class DataReader(SampleReader[T]):
         Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """
         participant = check_family(parent, topic, Subscriber)
-        group_qos = parent.qos if isinstance(parent, Subscriber) else Qos()
         super().__init__(participant, qos)
-        self._qos = topic.qos | group_qos | self._qos
         self._parent = parent
-        self._topic = topic
+        self._topic: Topic[T] = topic
+        plan = self._plan()
+        self._qos, self._endpoint_qos = plan.merged, plan.resolved
         support = topic.type_support
         self._deserialize = support.deserialize
         self._deserialize_key = support.deserialize_key
-        self._endpoint_qos = _with_representations(reader_qos(self._qos))
         self._undecodable: list[CacheChange] = []
         self._reader: LocalReader = self._pump.engine.create_reader(
             topic.name,
@@ -99,11 +99,6 @@ class DataReader(SampleReader[T]):
     @property
     def guid(self) -> Guid:
         return self._reader.guid
-
-    @property
-    def endpoint_qos(self) -> EndpointQos:
-        """Every policy as it holds for this reader, defaults filled in."""
-        return self._endpoint_qos
 
     def lookup_instance(self, sample: T) -> bytes | None:
         """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
@@ -154,6 +149,17 @@ class DataReader(SampleReader[T]):
         return publication_data(proxy.data, self._pump.engine.hooks)
 
     # --- inside ------------------------------------------------------------------------------------------
+
+    def _resolve(self, merged: Qos) -> EndpointQos:
+        return _with_representations(reader_qos(merged))
+
+    def _local(self) -> LocalReader:
+        return self._reader
+
+    def _follow(self, plan: QosPlan) -> None:
+        self._pump.engine.qos_changes.change_reader(self._reader, plan.resolved, self._pump.now())
+        super()._follow(plan)
+        self._pump.settle()
 
     def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
         """The sample as an object; None, and counted as lost, if its octets are not one."""

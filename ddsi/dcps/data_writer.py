@@ -26,7 +26,8 @@ from ..structure.status import (
     Status,
 )
 from ..structure.time import Time
-from .entity import Entity, deadline_scope
+from .endpoint import Endpoint, QosPlan
+from .entity import deadline_scope
 from .groups import Publisher, check_family
 from .topic import Topic
 
@@ -41,7 +42,7 @@ T = TypeVar("T")
 Timestamp = float | datetime
 
 
-class DataWriter(Entity, Generic[T]):
+class DataWriter(Endpoint, Generic[T]):
     """Writes samples of a topic; created without waiting, closed with its participant or by ``close()``."""
 
     STATUSES: ClassVar[tuple[type, ...]] = (
@@ -59,15 +60,14 @@ class DataWriter(Entity, Generic[T]):
         Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """
         participant = check_family(parent, topic, Publisher)
-        group_qos = parent.qos if isinstance(parent, Publisher) else Qos()
         super().__init__(qos)
-        self._qos = topic.qos | group_qos | self._qos
         self._parent = parent
         self._participant = participant
-        self._topic = topic
+        self._topic: Topic[T] = topic
         support = topic.type_support
         self._support = support
-        resolved = _with_representation(writer_qos(self._qos), support.representations, topic)
+        plan = self._plan()
+        self._qos, resolved = plan.merged, plan.resolved
         self._endpoint_qos = resolved
         self._representation = resolved.data_representation.ids[0]
         self._serialize = support.serializer(self._representation)
@@ -101,11 +101,6 @@ class DataWriter(Entity, Generic[T]):
     @property
     def guid(self) -> Guid:
         return self._writer.guid
-
-    @property
-    def endpoint_qos(self) -> EndpointQos:
-        """Every policy as it holds for this writer, defaults filled in."""
-        return self._endpoint_qos
 
     # --- writing -----------------------------------------------------------------------------------------
 
@@ -259,6 +254,17 @@ class DataWriter(Entity, Generic[T]):
         self._pump.settle()
 
     # --- inside ------------------------------------------------------------------------------------------
+
+    def _resolve(self, merged: Qos) -> EndpointQos:
+        return _with_representation(writer_qos(merged), self._support.representations, self._topic)
+
+    def _local(self) -> LocalWriter:
+        return self._writer
+
+    def _follow(self, plan: QosPlan) -> None:
+        self._pump.engine.qos_changes.change_writer(self._writer, plan.resolved, self._pump.now())
+        super()._follow(plan)
+        self._pump.settle()
 
     def _made_progress(self) -> None:
         self._progress.unpark_all()

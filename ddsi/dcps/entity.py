@@ -12,7 +12,7 @@ from weakref import WeakSet
 
 import trio
 
-from ..structure.errors import AlreadyDeleted, BadParameter, NotAllowedBySecurity
+from ..structure.errors import AlreadyDeleted, BadParameter, ImmutablePolicy, NotAllowedBySecurity
 from ..structure.qos import Qos
 from ..structure.status import Status
 
@@ -49,6 +49,10 @@ class EventStream(AsyncIterator[Status]):
         self._is_closed = True
         self._lot.unpark_all()
 
+    def poll(self) -> Status | None:
+        """The next event that is here already, if there is one; never waits."""
+        return self._events.popleft() if self._events else None
+
     def __aiter__(self) -> EventStream:
         return self
 
@@ -70,7 +74,7 @@ class Entity:
     def __init__(self, qos: Qos | None) -> None:
         if qos is not None and not isinstance(qos, Qos):
             raise BadParameter(f"{type(self).__name__}: qos is a ddsi.Qos(...), not {qos!r}")
-        self._qos = qos if qos is not None else Qos()
+        self._own_qos = self._qos = qos if qos is not None else Qos()
         self._is_closed = False
         self._revocation: str | None = None  # why security closed it, if it did
         self._changed = trio.lowlevel.ParkingLot()
@@ -82,8 +86,23 @@ class Entity:
 
     @property
     def qos(self) -> Qos:
-        """The Qos that the entity was given."""
+        """The Qos that the entity was given, and what it has from others; changed by :meth:`set_qos`."""
         return self._qos
+
+    def set_qos(self, qos: Qos) -> None:
+        """Change the policies that ``qos`` sets; all others stay as they are.  DDS 1.4 §2.2.2.1.1.3.
+
+        Peers are told, and pairs judged again.  Raises ImmutablePolicy for what is fixed by now, InconsistentPolicy,
+        NotAllowedBySecurity (say, for a partition), AlreadyDeleted; then nothing has changed.
+        """
+        self._check_open()
+        if not isinstance(qos, Qos):
+            raise BadParameter(f"{type(self).__name__}: qos is a ddsi.Qos(...), not {qos!r}")
+        self._change_qos(self._own_qos | qos)
+
+    def _change_qos(self, after: Qos) -> None:
+        """What the kind of entity does to have these policies."""
+        raise ImmutablePolicy(f"{self!r} has no policy that can be changed")
 
     @property
     def is_closed(self) -> bool:
@@ -164,6 +183,11 @@ class Parent(Entity):
     def participant(self) -> DomainParticipant:
         """The participant that it belongs to, or is."""
         raise NotImplementedError
+
+    @property
+    def endpoint_defaults(self) -> Qos:
+        """The policies that its endpoints have wherever they do not set their own."""
+        return Qos()
 
     def _adopt(self, entity: Entity) -> None:
         self._members[entity] = None

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..structure.errors import BadParameter, PreconditionNotMet
 from ..structure.qos import Qos
+from ..structure.qos_changes import check_changeable
+from .endpoint import Endpoint, follow_all
 from .entity import Parent
 from .topic import Topic
 
@@ -31,6 +33,15 @@ class _Group(Parent):
     @property
     def participant(self) -> DomainParticipant:
         return self._participant
+
+    @property
+    def endpoint_defaults(self) -> Qos:
+        return self._qos
+
+    def _change_qos(self, after: Qos) -> None:
+        check_changeable(self._qos, after, f"a {type(self).__name__}")
+        follow_all(member._plan(group=after) for member in self._members if isinstance(member, Endpoint))
+        self._own_qos = self._qos = after
 
     def _on_close(self) -> None:
         super()._on_close()

@@ -32,8 +32,10 @@ from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderDa
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import Qos
+from ..structure.qos_changes import check_changeable
 from ..structure.status import SecurityRefused, SecurityRevoked
 from ..transport import Pump, PumpOptions
+from .endpoint import Endpoint
 from .entity import Entity, Parent, deadline_scope
 from .lifetime import Lifetime
 from .type_access import AnnouncedEndpoint, fetch_type_object, fetch_type_objects
@@ -162,6 +164,12 @@ class DomainParticipant(Parent):
             if self._pump is not None:
                 self._pump.close()
 
+    def abandon(self) -> None:
+        """In the child of a fork: it is the parent's, so end it here without a word, nor a look at its tasks."""
+        self._is_closed = True
+        if self._pump is not None:
+            self._pump.abandon()
+
     def _options(self) -> PumpOptions:
         user_data = self._qos.user_data
         return PumpOptions(
@@ -171,6 +179,18 @@ class DomainParticipant(Parent):
             user_data=user_data.value if user_data is not None else b"",
             properties=participant_properties(self._qos.properties, self._config),
         )
+
+    def _change_qos(self, after: Qos) -> None:
+        if self._pump is not None:
+            check_changeable(self._qos, after, "a DomainParticipant")
+            user_data = after.user_data.value if after.user_data is not None else b""
+            self._pump.engine.qos_changes.change_user_data(user_data, self._pump.now())
+            self._pump.settle()
+        self._own_qos = self._qos = after
+
+    def _endpoints(self) -> list[Endpoint]:
+        """All writers and readers of topics, wherever they belong to."""
+        return [entity for entity in self._by_guid.values() if isinstance(entity, Endpoint)]
 
     # --- who is there ------------------------------------------------------------------------------------
 

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from ..structure.errors import BadParameter
 from ..structure.qos import Qos
+from ..structure.qos_changes import check_changeable
 from ..structure.status import InconsistentTopic
 from ..xtypes.type_support import TypeSupport, type_support
+from .endpoint import follow_all
 from .entity import Entity
 
 if TYPE_CHECKING:
@@ -59,6 +61,12 @@ class Topic(Entity, Generic[T]):
     @property
     def type_support(self) -> TypeSupport[T]:
         return self._type_support
+
+    def _change_qos(self, after: Qos) -> None:
+        check_changeable(self._qos, after, f"topic {self._name!r}")
+        endpoints = self._participant._endpoints()
+        follow_all(endpoint._plan(topic=after) for endpoint in endpoints if endpoint.topic is self)
+        self._own_qos = self._qos = after
 
     def _found_inconsistent(self, remote_type_name: str) -> None:
         """One of its writers or readers met a peer that uses the name with another type."""
