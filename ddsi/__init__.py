@@ -15,6 +15,7 @@ General layout, top to bottom; a room imports only rooms above it, never this pa
     engine         the participant as one machine without I/O
     transport      sockets, clock, trio                  simulation   the same engine over a virtual network
     dcps           what applications hold                                               DDS 1.4
+    portal         the engine in a thread of its own; blocking, aio: its faces for scripts and for asyncio
     cli            the ``ddsi`` command
 
 The names below are the public face; everything else may change.

@@ -177,6 +177,11 @@ class Pump:
             self._running.cancel()
             self._files.close()
 
+    def abandon(self) -> None:
+        """In the child of a fork: nothing is said, and what the child holds of the sockets is closed."""
+        self.is_closed = True
+        self._files.close()
+
     @trio.lowlevel.enable_ki_protection
     async def _receive(self, sock: socket.socket) -> None:
         while not self.is_closed:

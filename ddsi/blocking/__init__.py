@@ -1,0 +1,35 @@
+"""DDS for plain scripts and threads: the entities of ``ddsi``, with calls that wait.
+
+The same engine serves them, in one thread of its own that starts with the first participant and ends with the last.
+Any thread may call anything; nothing of an application runs in the engine's thread but the queries of conditions.
+DESIGN: ``ddsi/portal/engine_thread.py``.
+
+    with ddsi.blocking.DomainParticipant(0) as participant:
+        reader = ddsi.blocking.DataReader(participant, ddsi.blocking.Topic(participant, "Square", ShapeType))
+        for sample in reader:
+            print(sample.data)
+"""
+
+from .entities import (
+    BuiltinTopicReader,
+    DataReader,
+    DataWriter,
+    DomainParticipant,
+    EventStream,
+    Publisher,
+    Subscriber,
+    Topic,
+)
+from .listener import Listener
+
+__all__ = [
+    "BuiltinTopicReader",
+    "DataReader",
+    "DataWriter",
+    "DomainParticipant",
+    "EventStream",
+    "Listener",
+    "Publisher",
+    "Subscriber",
+    "Topic",
+]

@@ -1,0 +1,299 @@
+"""The entities for plain scripts and threads.  DDS 1.4 §2.2.2.
+
+What waits in ``ddsi`` by ``await`` waits here in the calling thread; Ctrl-C ends any wait.  The arguments, results and
+errors are those of ``ddsi``; what differs is said here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import partial
+from types import TracebackType
+from typing import TYPE_CHECKING, Generic, Self, TypeVar, Unpack
+
+from .. import dcps
+from ..config import Config
+from ..dcps.data_writer import Timestamp
+from ..dcps.entity import deadline_scope
+from ..portal.entities import (
+    EntityPortal,
+    GroupPortal,
+    ParticipantPortal,
+    ReaderPortal,
+    SampleReaderPortal,
+    Selection,
+    TopicPortal,
+    WriterPortal,
+    check_parent,
+)
+from ..structure.builtin_topic_data import (
+    ParticipantBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
+)
+from ..structure.errors import AlreadyDeleted, DdsTimeout
+from ..structure.qos import Qos
+from ..structure.status import Status
+from .listener import Listener, Listening
+
+if TYPE_CHECKING:
+    from ..trace.sink import TraceSink
+
+__all__ = [
+    "BuiltinTopicReader",
+    "DataReader",
+    "DataWriter",
+    "DomainParticipant",
+    "EventStream",
+    "Publisher",
+    "Subscriber",
+    "Topic",
+]
+
+T = TypeVar("T")
+B = TypeVar("B", ParticipantBuiltinTopicData, PublicationBuiltinTopicData, SubscriptionBuiltinTopicData)
+
+
+class EventStream(Iterator[Status]):
+    """``for event in entity.events()``: the statuses of one entity as they change, until it is closed."""
+
+    def __init__(self, entity: EntityPortal) -> None:
+        self._engine = entity._engine
+        self._stream: dcps.EventStream = self._engine.run_now(entity._entity.events)
+
+    @property
+    def dropped(self) -> int:
+        """How many were forgotten because more than 1024 waited unread."""
+        return self._stream.dropped
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> Status:
+        try:
+            event = self._engine.run(self._next)
+        except AlreadyDeleted:  # the participant has gone altogether
+            event = None
+        if event is None:
+            raise StopIteration
+        return event
+
+    async def _next(self) -> Status | None:
+        try:
+            return await self._stream.__anext__()
+        except StopAsyncIteration:
+            return None
+
+
+class _Blocking(EntityPortal):
+    """What all entities of this module have besides."""
+
+    _listening: Listening | None = None
+
+    def events(self) -> EventStream:
+        """The communication statuses from now on; what happened while nobody listened (the latest 64) comes first."""
+        return EventStream(self)
+
+    def set_listener(self, listener: Listener | None) -> None:
+        """Have the ``listener`` called, in a thread of its own, instead of the one before; None: nobody."""
+        if self._listening is not None:
+            self._listening.stop()
+        self._listening = Listening(self, listener) if listener is not None else None
+
+
+class DomainParticipant(_Blocking, ParticipantPortal):
+    """A member of a domain, from the moment it is made: use it by ``with``, or :meth:`close` it.
+
+    One that is forgotten is closed when it is collected, and when the interpreter ends.
+    """
+
+    def __init__(
+        self,
+        domain_id: int = 0,
+        *,
+        qos: Qos | None = None,
+        config: Config | None = None,
+        trace: TraceSink | None = None,
+        listener: Listener | None = None,
+    ) -> None:
+        """As ``ddsi.DomainParticipant``, entered at once: raises what entering that one raises too."""
+        super().__init__(domain_id, qos=qos, config=config, trace=trace)
+        stay = self._reserve()
+        try:
+            self._engine.run(stay.enter)
+        except BaseException:
+            self._has_failed(stay)
+            raise
+        self._has_entered()
+        self.set_listener(listener)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._leave(at_once=error is not None)
+
+    def close(self) -> None:
+        """Leave the domain.  Reliable samples under way get a second to be acknowledged.  Safe twice."""
+        self._leave(at_once=False)
+
+    def _leave(self, *, at_once: bool) -> None:
+        stay = self._begin_to_leave()
+        if stay is None:
+            return
+        if self._engine.is_of_parent:
+            return
+        try:
+            self._engine.run(partial(stay.leave, at_once=at_once))
+        finally:
+            self._engine.join()
+
+    def wait_for_discovery(self, timeout: float | None = None) -> None:
+        """Until the tables of remote participants and endpoints change.  Raises DdsTimeout, AlreadyDeleted."""
+
+        async def wait() -> None:
+            with deadline_scope(timeout):
+                await self._inner.wait_for_discovery()
+                return
+            raise DdsTimeout(f"{self._inner!r}: nothing changed in {timeout} s; `ddsi ls` shows who is there")
+
+        self._engine.run(wait)
+
+
+class Topic(_Blocking, TopicPortal[T], Generic[T]):
+    """What writers and readers agree on: the topic's name and the type of its samples."""
+
+
+class Publisher(_Blocking, GroupPortal):
+    """The writers created with it have its policies wherever they do not set their own."""
+
+    _KIND = dcps.Publisher
+
+
+class Subscriber(_Blocking, GroupPortal):
+    """The readers created with it have its policies wherever they do not set their own."""
+
+    _KIND = dcps.Subscriber
+
+
+class DataWriter(_Blocking, WriterPortal[T], Generic[T]):
+    """Writes samples of a topic."""
+
+    def __init__(
+        self,
+        parent: DomainParticipant | Publisher,
+        topic: Topic[T],
+        qos: Qos | None = None,
+        *,
+        listener: Listener | None = None,
+    ) -> None:
+        """Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created."""
+        super().__init__(parent, topic, qos)
+        self.set_listener(listener)
+
+    def write(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
+        """Write one sample: see ``ddsi.DataWriter.write``."""
+        self._engine.run_in_lane(self._lane, partial(self._inner.write, sample, timestamp=timestamp))
+
+    def write_all(self, samples: Iterable[T]) -> None:
+        """Write them in order.  Several times faster than one by one, as threads are crossed once.
+
+        What is raised for one leaves those before it written and those after it not.
+        """
+        self._engine.run_in_lane(self._lane, partial(self._write_all, list(samples)))
+
+    def dispose(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
+        """The instance that ``sample`` belongs to (only its key fields matter) has come to its end."""
+        self._engine.run_in_lane(self._lane, partial(self._inner.dispose, sample, timestamp=timestamp))
+
+    def unregister(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
+        """This writer says nothing more of the instance."""
+        self._engine.run_in_lane(self._lane, partial(self._inner.unregister, sample, timestamp=timestamp))
+
+    def wait_for_acknowledgments(self, timeout: float | None = None) -> None:
+        """Until every matched reliable reader has all that was written so far.  Raises DdsTimeout."""
+        self._engine.run(self._inner.wait_for_acknowledgments, timeout)
+
+    def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
+        """Until at least ``count`` readers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        self._engine.run(self._inner.wait_for_matched, count, timeout)
+
+
+class _Reading(_Blocking, SampleReaderPortal[T], Generic[T]):
+    """``for sample in reader`` takes one after the other, and waits for more until the reader is closed."""
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> dcps.Sample[T]:
+        if not self._fetched:
+            if self._entity.is_closed:
+                raise StopIteration
+            try:
+                self._engine.run(self._fetch)
+            except AlreadyDeleted:  # the participant has gone altogether
+                raise StopIteration from None
+        try:
+            return self._fetched.popleft()
+        except IndexError:
+            raise StopIteration from None
+
+    def take(self, max_samples: int | None = None, **selection: Unpack[Selection]) -> list[dcps.Sample[T]]:
+        """Samples that are here now, oldest first, removed from the reader; never waits for one."""
+        return self._engine.run_now(self._take_now, max_samples, selection)
+
+    def read(self, max_samples: int | None = None, **selection: Unpack[Selection]) -> list[dcps.Sample[T]]:
+        """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
+        return self._engine.run_now(partial(self._source.read, max_samples, **selection))
+
+    def wait(self, condition: dcps.ReadCondition | None = None, timeout: float | None = None) -> None:
+        """Until there is a sample that fits ``condition`` (none given: one that has not been read).
+
+        Raises DdsTimeout after ``timeout`` seconds; AlreadyDeleted, also when the reader is closed meanwhile.
+        """
+
+        async def wait() -> None:
+            with deadline_scope(timeout):
+                await self._wait_now(condition)
+                return
+            raise DdsTimeout(f"{self._entity!r}: no such sample in {timeout} s")
+
+        self._engine.run(wait)
+
+
+class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
+    """Reads samples of a topic: ``for sample in reader``, or ``take`` and ``read``."""
+
+    def __init__(
+        self,
+        parent: DomainParticipant | Subscriber,
+        topic: Topic[T],
+        qos: Qos | None = None,
+        *,
+        listener: Listener | None = None,
+    ) -> None:
+        """Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created."""
+        ReaderPortal.__init__(self, parent, topic, qos)
+        self.set_listener(listener)
+
+    def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
+        """Until at least ``count`` writers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        self._engine.run(self._inner.wait_for_matched, count, timeout)
+
+    def wait_for_historical_data(self, timeout: float | None = None) -> None:
+        """Until all that the matched transient-local writers held at the match has come.  Raises DdsTimeout."""
+        self._engine.run(self._inner.wait_for_historical_data, timeout)
+
+
+class BuiltinTopicReader(_Reading[B], Generic[B]):
+    """Reads of remote participants, writers or readers: see ``ddsi.BuiltinTopicReader``."""
+
+    def __init__(self, participant: DomainParticipant, kind: type[B], *, listener: Listener | None = None) -> None:
+        """``kind``: ParticipantBuiltinTopicData, PublicationBuiltinTopicData or SubscriptionBuiltinTopicData."""
+        check_parent(participant, DomainParticipant)
+        self._participant = participant
+        inner = participant._ask(partial(dcps.BuiltinTopicReader, participant._inner, kind))
+        super().__init__(participant._engine, inner)
+        self.set_listener(listener)
