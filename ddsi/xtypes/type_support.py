@@ -25,7 +25,7 @@ from .topic_type import complete, default_representations
 from .value_check import check_sample
 from .write_source import generate_writer
 
-__all__ = ["Octets", "TypeSupport", "type_support"]
+__all__ = ["SUPPORT_ATTRIBUTE", "Octets", "TypeSupport", "type_support"]
 
 T = TypeVar("T")
 
@@ -48,14 +48,14 @@ def type_support(python_class: type[T]) -> TypeSupport[T]:
     Raises BadParameter if the class is not one, or cannot be a topic type (with member and reason).
     """
     struct = struct_type(python_class)
-    found: TypeSupport[T] | None = python_class.__dict__.get(_ATTRIBUTE)
+    found: TypeSupport[T] | None = python_class.__dict__.get(SUPPORT_ATTRIBUTE)
     if found is None:
         found = TypeSupport(python_class, struct)
-        setattr(python_class, _ATTRIBUTE, found)
+        setattr(python_class, SUPPORT_ATTRIBUTE, found)
     return found
 
 
-_ATTRIBUTE = "__idl_support__"
+SUPPORT_ATTRIBUTE = "__idl_support__"
 """Where a class keeps its TypeSupport; looked for in the class itself, never in its bases."""
 
 
@@ -76,6 +76,9 @@ class TypeSupport(Generic[T]):
     key_from_payload: Callable[[Octets], bytes]
     """The canonical key in a whole sample's payload, read no further than needed.  Raises MalformedSample."""
 
+    serializers_asked_for: dict[tuple[DataRepresentationId | None, str], Callable[[T], bytes]]
+    """What ``ddsi.serialize`` found here before, by its arguments: looking for it takes longer than its work."""
+
     def __init__(self, python_class: type[T], struct: StructType) -> None:
         self.python_class = python_class
         self.struct = struct
@@ -84,6 +87,7 @@ class TypeSupport(Generic[T]):
         self.representations: tuple[DataRepresentationId, ...] = default_representations(complete(struct))
         self._sources: dict[tuple[Any, ...], str] = {}
         self._writers: dict[tuple[Any, ...], Callable[[Any], bytes]] = {}
+        self.serializers_asked_for = {}
         key, canonical = key_type(struct), canonical_key_type(struct)
         self.is_keyed: bool = canonical is not None
         self.deserialize = self._reader(struct)
