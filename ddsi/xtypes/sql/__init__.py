@@ -1,0 +1,23 @@
+"""DDS SQL: the expressions of content-filtered topics, queries and multi-topics, parsed and made functions.
+
+DDS 1.4 Annex B (Syntax for Queries and Filters).  Expressions come from applications, and from peers that announce
+what their readers let pass, so everything is bounded and nothing of a text is ever executed: parsing makes a tree,
+and the tree, checked against a type, closures over it.
+"""
+
+from .field_path import FieldPath
+from .filter_expression import FilterExpression
+from .parser import parse_filter, parse_query, parse_topic_expression
+from .query_expression import QueryExpression
+from .syntax import InvalidExpression, TopicExpression
+
+__all__ = [
+    "FieldPath",
+    "FilterExpression",
+    "InvalidExpression",
+    "QueryExpression",
+    "TopicExpression",
+    "parse_filter",
+    "parse_query",
+    "parse_topic_expression",
+]
