@@ -8,21 +8,20 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import sys
-from types import FrameType
 from typing import Any
 
 from ..structure.errors import BadParameter
 from . import model
 from .definition import own_annotations
 from .model import Bitfield, BitsetType, Primitive
-from .resolution import STRUCT_ATTRIBUTE, Resolver
+from .resolution import STRUCT_ATTRIBUTE, Resolver, Scope
 
 __all__ = ["bitset_from", "define_bitset"]
 
 _INTEGERS = (model.INT8, model.INT16, model.INT32, model.INT64)
 
 
-def define_bitset(python_class: type[Any], *, type_name: str | None, frame: FrameType) -> type[Any]:
+def define_bitset(python_class: type[Any], *, type_name: str | None, frame: Scope) -> type[Any]:
     """The decorated class; see :func:`ddsi.idl.bitset`."""
     name = python_class.__name__
     bases = [base.__dict__.get(STRUCT_ATTRIBUTE) for base in python_class.__bases__]
@@ -75,7 +74,7 @@ def _zero(field: Bitfield) -> Any:
     return False if field.type == model.BOOLEAN else 0
 
 
-def _fields(python_class: type[Any], base: BitsetType | None, frame: FrameType) -> tuple[Bitfield, ...]:
+def _fields(python_class: type[Any], base: BitsetType | None, frame: Scope) -> tuple[Bitfield, ...]:
     name = python_class.__name__
     module = sys.modules.get(python_class.__module__)
     resolver = Resolver(dict(vars(module)) if module is not None else {}, frame.f_locals)

@@ -12,14 +12,13 @@ import dataclasses
 import inspect
 import sys
 from collections.abc import Callable, Mapping
-from types import FrameType
 from typing import Any
 
 from ..structure.errors import BadParameter
 from .annotations import HashId, MemberId, autoid_hash
 from .equality import same_members
 from .model import Extensibility, Member, StructType
-from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver
+from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver, Scope
 from .topic_type import refuse_impossible
 from .value_check import check_value
 
@@ -41,7 +40,7 @@ def define_struct(
     extensibility: Extensibility,
     autoid: str,
     is_nested: bool,
-    frame: FrameType,
+    frame: Scope,
 ) -> type[Any]:
     """The decorated class; see :func:`ddsi.idl.struct`."""
     if not isinstance(python_class, type):
@@ -99,11 +98,11 @@ def _slotted(python_class: type[Any]) -> type[Any]:
 class _MemberSearch:
     """Finds the members of one class, once all names in its annotations are defined."""
 
-    def __init__(self, python_class: type[Any], base: StructType | None, *, hashed: bool, frame: FrameType) -> None:
+    def __init__(self, python_class: type[Any], base: StructType | None, *, hashed: bool, frame: Scope) -> None:
         self._class = python_class
         self._base = base
         self._hashed = hashed
-        self._frame: FrameType | None = frame
+        self._frame: Scope | None = frame
 
     def members(self) -> tuple[Member, ...]:
         inherited = self._base.declared if self._base is not None else ()

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from .model import Composite, nested_structs, reachable_structs
+from .components import strongly_connected
+from .model import Composite, nested_structs
 
 __all__ = ["DEEPEST_COLLECTION", "FunctionPlan", "is_recursive"]
 
@@ -27,19 +28,27 @@ DEEPEST_COLLECTION = 12
 
 def is_recursive(struct: Composite) -> bool:
     """Whether values of the struct may contain values of itself."""
-    return any(
-        inner is struct
-        for member in struct.members
-        for nested in nested_structs(member.type)
-        for inner in reachable_structs(nested)
-    )
+    return struct in _recursive(struct)
+
+
+def _recursive(root: Composite) -> set[Composite]:
+    """Of all structs and unions that ``root`` may contain, itself included, those whose values may contain their kind.
+
+    Found together, in time linear in the type: asking each struct for itself is quadratic, and types come from peers.
+    """
+    _, components = strongly_connected(root, _nested)
+    return {struct for one in components for struct in one if len(one) > 1 or struct in _nested(struct)}
+
+
+def _nested(struct: Composite) -> list[Composite]:
+    return [nested for member in struct.members for nested in nested_structs(member.type)]
 
 
 class FunctionPlan:
     """Decides while one module is generated."""
 
     def __init__(self, root: Composite) -> None:
-        self._recursive = {id(struct) for struct in reachable_structs(root) if is_recursive(struct)}
+        self._recursive = _recursive(root)
         self._functions: dict[int, str] = {}
         self._inlined = 0
         self._depth = 0
@@ -53,7 +62,7 @@ class FunctionPlan:
         if known is not None:
             return known, False
         fits = self._inlined < _MOST_INLINED and self._depth < _DEEPEST_INLINED
-        if fits and id(struct) not in self._recursive:
+        if fits and struct not in self._recursive:
             self._inlined += 1
             return None
         name = f"{struct.python_class.__name__}_{len(self._functions)}"

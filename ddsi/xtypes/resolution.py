@@ -14,7 +14,7 @@ import types
 import typing
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 from ..structure.dataclass import dataclass
 from ..structure.errors import BadParameter
@@ -36,7 +36,7 @@ from .model import (
     UnionType,
 )
 
-__all__ = ["Resolved", "Resolver", "named_type"]
+__all__ = ["Resolved", "Resolver", "Scope", "named_type"]
 
 STRUCT_ATTRIBUTE = "__idl_struct__"
 """Where a class decorated with ``idl.struct``, ``idl.union`` or ``idl.bitset`` keeps the type that it is."""
@@ -52,6 +52,13 @@ _NUMPY_NUMBERS = {
 _MAPS = (dict, collections.abc.Mapping, collections.abc.MutableMapping)
 
 _SEQUENCES = (list, collections.abc.Sequence, collections.abc.MutableSequence)
+
+
+class Scope(Protocol):
+    """Where local names are looked up: the frame around a class, or what stands for one where there is no source."""
+
+    @property
+    def f_locals(self) -> Mapping[str, Any]: ...
 
 
 @dataclass(slots=True)

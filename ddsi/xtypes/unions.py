@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Mapping
-from types import FrameType
 from typing import Any
 
 from ..structure.errors import BadParameter
@@ -32,7 +31,7 @@ from .model import (
     Primitive,
     UnionType,
 )
-from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver
+from .resolution import STRUCT_ATTRIBUTE, Resolved, Resolver, Scope
 from .topic_type import refuse_impossible
 
 __all__ = ["define_union", "selected_member", "union_type"]
@@ -59,7 +58,7 @@ def define_union(
     extensibility: Extensibility,
     autoid: str,
     is_nested: bool,
-    frame: FrameType,
+    frame: Scope,
 ) -> type[Any]:
     """The decorated class; see :func:`ddsi.idl.union`."""
     if not isinstance(python_class, type):
@@ -87,13 +86,11 @@ def define_union(
 class _CaseSearch:
     """Finds the discriminator and the cases, once all names in the annotations are defined."""
 
-    def __init__(
-        self, python_class: type[Any], labels: dict[str, CaseLabels], *, hashed: bool, frame: FrameType
-    ) -> None:
+    def __init__(self, python_class: type[Any], labels: dict[str, CaseLabels], *, hashed: bool, frame: Scope) -> None:
         self._name = python_class.__name__
         self._labels = labels
         self._hashed = hashed
-        self._frame: FrameType | None = frame
+        self._frame: Scope | None = frame
         self.decorated = python_class
         annotations = own_annotations(python_class)
         for member in annotations:
