@@ -14,7 +14,8 @@ class Instance:
     """One instance: its samples (oldest first), who writes it, and its states.
 
     ``end_count``: how many of the samples have no data, but tell of an end.  ``owner``: the writer that owns it, where
-    ownership is exclusive.  ``accepted_at``: when the time-based filter last let a sample pass.
+    ownership is exclusive.  ``accepted_at``: when the time-based filter last let a sample pass.  ``settled``: where the
+    order is by source, the stamp of the latest sample that has left: what is older comes too late.
     """
 
     __slots__ = (
@@ -26,6 +27,7 @@ class Instance:
         "owner",
         "rank",
         "samples",
+        "settled",
         "state",
         "view_state",
         "writers",
@@ -43,6 +45,7 @@ class Instance:
         self.rank = 0
         self.owner: bytes | None = None
         self.accepted_at = -math.inf
+        self.settled: tuple[int, bytes] = (-1, b"")
 
     @property
     def generation(self) -> int:

@@ -2,7 +2,8 @@
 
 DDS 1.4 §2.2.2.5 (Subscription Module: states, ranks, generation counts), §2.2.3.18-19 (HISTORY, RESOURCE_LIMITS).
 What is let in at all, and for how long, its :class:`.sample_gate.SampleGate` decides.
-Samples come here in the order that RTPS established and leave in the order of arrival.  It holds octets, not data:
+Samples come here in the order that RTPS established and leave in the order of arrival, those of one instance in that of
+their source timestamps where DESTINATION_ORDER says so (§2.2.3.17).  It holds octets, not data:
 deserialising is done when a sample is taken, by whoever takes it.
 """
 
@@ -15,7 +16,7 @@ from copy import copy
 from ..structure.cache_change import CacheChange, ChangeKind, StatusInfo
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos
-from ..structure.qos_policies import LENGTH_UNLIMITED, KeepLast
+from ..structure.qos_policies import LENGTH_UNLIMITED, BySourceTimestamp, KeepLast
 from ..structure.sample_info import (
     ANY_INSTANCE_STATE,
     ANY_SAMPLE_STATE,
@@ -43,8 +44,8 @@ class ReaderHistoryCache:
     """A ChangeSink for application readers.
 
     ``on_news`` is called when something can be read and the last such call has been cleared by :meth:`seen`;
-    ``on_rejected`` with the name of a limit, for best-effort samples that find no room; ``on_timer`` when
-    :meth:`handle_timeout` is wanted earlier than it was told before.
+    ``on_rejected`` with the name of a limit, the sample that finds no room, and whether that was its end: a reliable
+    one will come again, and is told of once; ``on_timer`` when :meth:`handle_timeout` is wanted earlier than before.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class ReaderHistoryCache:
         max_instances: int,
         clock_offset: float = 0.0,
         on_news: Callable[[], None] = lambda: None,
-        on_rejected: Callable[[str], None] = lambda reason: None,
+        on_rejected: Callable[[str, CacheChange, bool], None] = lambda limit, change, is_final: None,
         on_timer: Callable[[float], None] = lambda due: None,
         wall_time: Callable[[float], float] | None = None,
     ) -> None:
@@ -79,6 +80,8 @@ class ReaderHistoryCache:
         self._on_rejected = on_rejected
         self._has_news = False
         self.is_withholding = False  # did a reliable writer's sample find no room?
+        self._withheld: dict[bytes, int] = {}  # by writer: the number that found none last
+        self._by_source = isinstance(qos.destination_order, BySourceTimestamp)
         self._instances: dict[bytes, Instance] = {}
         # In order of arrival.  What was taken from the middle or pushed out stays until it comes to the front
         # or the queue is compacted; such a sample has no change any more.
@@ -102,8 +105,7 @@ class ReaderHistoryCache:
 
     def qos_changed(self, qos: EndpointQos, now: float) -> None:
         """The reader's policies, as far as they may change, are now these.  DDS 1.4 §2.2.3."""
-        alive = [instance.key for instance in self._instances.values() if instance.state is _ALIVE]
-        self._gate.qos_changed(qos, alive, now)
+        self._gate.qos_changed(qos, self._instances.values(), now)
 
     # --- what comes in -----------------------------------------------------------------------------------
 
@@ -114,7 +116,7 @@ class ReaderHistoryCache:
             if change.kind is not ChangeKind.ALIVE:
                 return True  # the end of something that nobody here has heard of
             if len(self._instances) >= self._max_instances:
-                return self._no_room("max_instances")
+                return self._no_room("max_instances", change)
             instance = Instance(change.key)  # known from the moment that it has a sample
         if change.kind is not ChangeKind.ALIVE:
             self._add_end(instance, change, now)
@@ -123,12 +125,14 @@ class ReaderHistoryCache:
         if not gate.is_open and not gate.admits(instance, change, now):
             return True
         samples = instance.samples
+        if self._by_source and self._comes_too_late(instance, change):
+            return True
         if self._depth and len(samples) - instance.end_count >= self._depth:
             self._push_out(instance)
         else:
             limit = self._limit_reached(instance, len(change.payload))
             if limit is not None:
-                return self._no_room(limit)
+                return self._no_room(limit, change)
             self._instances[change.key] = instance
         if instance.state is not _ALIVE:
             self._revive(instance)
@@ -137,8 +141,11 @@ class ReaderHistoryCache:
         info = SampleInfo(change, now + self._clock_offset, valid_data=True)
         info.disposed_generation_count = instance.disposed_generation_count
         info.no_writers_generation_count = instance.no_writers_generation_count
-        samples.append(info)
-        self._order.append(info)
+        if self._by_source and samples:
+            self._insert_by_source(samples, info, _stamp(change))
+        else:
+            samples.append(info)
+            self._order.append(info)
         self._octets += len(change.payload)
         if not gate.is_open:
             gate.admitted(instance, info, change, now)
@@ -157,6 +164,7 @@ class ReaderHistoryCache:
         """A writer is gone: it writes no instance, and its policies are forgotten."""
         self.writer_lost(writer, now)
         self._gate.writer_unmatched(writer)
+        self._withheld.pop(writer, None)
 
     def writer_lost(self, writer: Guid, now: float) -> None:
         """A writer was unmatched, or its liveliness was lost: it no longer writes any instance."""
@@ -188,6 +196,8 @@ class ReaderHistoryCache:
     def _add_end(self, instance: Instance, change: CacheChange, now: float) -> None:
         """Dispose, unregister, or both.  DDS 1.4 figure 2.11: disposed wins until somebody writes again."""
         may_dispose = self._gate.may_write(change.writer_guid, instance)
+        if self._by_source and may_dispose and change.kind & StatusInfo.DISPOSED:
+            may_dispose = self._is_latest(instance, change)
         if change.kind & StatusInfo.DISPOSED and may_dispose and instance.state is not InstanceState.NOT_ALIVE_DISPOSED:
             self._end(instance, InstanceState.NOT_ALIVE_DISPOSED, change, now)
         if change.kind & StatusInfo.UNREGISTERED:
@@ -205,7 +215,7 @@ class ReaderHistoryCache:
         a thousand times does not fill the cache.
         """
         instance.state = state
-        self._gate.ended(instance.key)
+        self._gate.ended(instance, now)
         last = instance.samples[-1] if instance.samples else None
         if last is None or last.valid_data or last.sample_state is _READ:
             if self._depth and instance.end_count:
@@ -229,6 +239,42 @@ class ReaderHistoryCache:
             instance.no_writers_generation_count += 1
         instance.state = _ALIVE
         instance.view_state = _NEW
+        self._gate.revived(instance.key)
+
+    # --- order by source -----------------------------------------------------------------------------------
+
+    def _comes_too_late(self, instance: Instance, change: CacheChange) -> bool:
+        """Is the sample older than what the application has seen already, or than all that KEEP_LAST keeps?"""
+        stamp = _stamp(change)
+        if stamp < instance.settled:
+            return True
+        samples = instance.samples
+        if not self._depth or len(samples) - instance.end_count < self._depth:
+            return False
+        return stamp < next(_stamp(info._change) for info in samples if info.valid_data)
+
+    def _is_latest(self, instance: Instance, change: CacheChange) -> bool:
+        """A dispose: nothing that was written later may be here, or have been.  If so, it ends what came before."""
+        latest = max((_stamp(info._change) for info in instance.samples if info.valid_data), default=instance.settled)
+        stamp = _stamp(change)
+        if stamp < max(latest, instance.settled):
+            return False
+        instance.settled = stamp
+        return True
+
+    def _insert_by_source(self, samples: deque[SampleInfo], info: SampleInfo, stamp: tuple[int, bytes]) -> None:
+        """Before the first sample of its instance that was written later; most often there is none."""
+        later: SampleInfo | None = None
+        place = len(samples)
+        for index in range(len(samples) - 1, -1, -1):
+            known = samples[index]
+            if not known.valid_data or _stamp(known._change) < stamp:
+                break
+            later, place = known, index
+        samples.insert(place, info)
+        self._order.insert(self._order.index(later) if later is not None else len(self._order), info)
+
+    # --- room ----------------------------------------------------------------------------------------------
 
     def _limit_reached(self, instance: Instance, octets: int) -> str | None:
         if self._max_per_instance and len(instance.samples) >= self._max_per_instance:
@@ -239,12 +285,15 @@ class ReaderHistoryCache:
             return "octets of history"
         return None
 
-    def _no_room(self, limit: str) -> bool:
-        if self._is_reliable:
-            self.is_withholding = True
-            return False
-        self._on_rejected(limit)
-        return True
+    def _no_room(self, limit: str, change: CacheChange) -> bool:
+        if not self._is_reliable:
+            self._on_rejected(limit, change, True)
+            return True
+        self.is_withholding = True
+        if self._withheld.get(change.writer_guid) != change.sequence_number:
+            self._withheld[change.writer_guid] = change.sequence_number
+            self._on_rejected(limit, change, False)
+        return False
 
     def _push_out(self, instance: Instance) -> None:
         """KEEP_LAST: the oldest sample with data goes.  What tells of an end stays; there is one such at most."""
@@ -271,6 +320,8 @@ class ReaderHistoryCache:
             instance.samples.remove(info)
         if not info.valid_data:
             instance.end_count -= 1
+        elif self._by_source:
+            instance.settled = max(instance.settled, _stamp(info._change))
 
     def _discard(self, info: SampleInfo) -> None:
         change = info._change
@@ -296,8 +347,17 @@ class ReaderHistoryCache:
         for key in missed:
             if key in self._instances:
                 self._instances[key].owner = None
+        for key in self._gate.to_purge(now):
+            self._forget(key)
         self._gate.arm()
         return missed
+
+    def _forget(self, key: bytes) -> None:
+        """READER_DATA_LIFECYCLE, DDS 1.4 §2.2.3.22: the instance goes, with what was not taken of it."""
+        instance = self._instances.pop(key, None)
+        if instance is not None:
+            for info in list(instance.samples):
+                self._remove(instance, info)
 
     # --- what goes out -----------------------------------------------------------------------------------
 
@@ -431,6 +491,12 @@ class ReaderHistoryCache:
         for info, instance in chosen:
             info.generation_rank = latest[info.instance_handle] - _generation(info)
             info.absolute_generation_rank = instance.generation - _generation(info)
+
+
+def _stamp(change: CacheChange | None) -> tuple[int, bytes]:
+    """What BY_SOURCE_TIMESTAMP orders by; where two writers wrote at once all readers decide alike (§2.2.3.17)."""
+    assert change is not None
+    return change.source_timestamp, change.writer_guid
 
 
 def _generation(info: SampleInfo) -> int:

@@ -1,6 +1,7 @@
 """SampleGate: which samples a reader's policies let in, how long they stay, and which do not come in time.
 
-DDS 1.4 §2.2.3.9 (OWNERSHIP), §2.2.3.12 (TIME_BASED_FILTER), §2.2.3.16 (LIFESPAN), §2.2.3.7 (DEADLINE).  It stands
+DDS 1.4 §2.2.3.9 (OWNERSHIP), §2.2.3.12 (TIME_BASED_FILTER), §2.2.3.16 (LIFESPAN), §2.2.3.7 (DEADLINE), §2.2.3.22
+(READER_DATA_LIFECYCLE).  It stands
 before a :class:`.reader_history_cache.ReaderHistoryCache` and only says; the cache does.  What is turned away has been
 received all the same, as far as RTPS is concerned.
 """
@@ -36,6 +37,7 @@ class SampleGate:
         "_lifespans",
         "_on_timer",
         "_owners",
+        "_purges",
         "_separation",
         "_timer_due",
         "_wall_time",
@@ -49,6 +51,8 @@ class SampleGate:
         self._owners = Owners() if isinstance(qos.ownership, Exclusive) else None
         self._separation = qos.time_based_filter.minimum_separation
         self._deadline = DeadlineWatch(qos.deadline.period) if qos.deadline.period < math.inf else None
+        # What nothing was heard of for so long since its end is forgotten: the same account as that of deadlines.
+        self._purges = {state: DeadlineWatch(delay) for state, delay in _purge_delays(qos) if delay < math.inf}
         self._wall_time = wall_time
         self._on_timer = on_timer
         # Of the matched writers whose samples expire; and these samples by when, with a number that orders equal ones.
@@ -61,10 +65,19 @@ class SampleGate:
     def _may_be_open(self) -> None:
         self.is_open = self._owners is None and self._separation == 0 and self._deadline is None and not self._lifespans
 
-    def qos_changed(self, qos: EndpointQos, alive: Iterable[bytes], now: float) -> None:
-        """Policies that may change have changed; ``alive``: the instances of which samples are to be expected."""
+    def qos_changed(self, qos: EndpointQos, instances: Iterable[Instance], now: float) -> None:
+        """Policies that may change have changed; the new periods of ``instances`` begin now."""
+        by_state: dict[InstanceState, list[bytes]] = {state: [] for state in InstanceState}
+        for instance in instances:
+            by_state[instance.state].append(instance.key)
         self._separation = qos.time_based_filter.minimum_separation
+        alive = by_state[InstanceState.ALIVE]
         self._deadline = DeadlineWatch.anew(self._deadline, qos.deadline.period, alive, now)
+        before, self._purges = self._purges, {}
+        for state, delay in _purge_delays(qos):
+            watch = DeadlineWatch.anew(before.get(state), delay, by_state[state], now)
+            if watch is not None:
+                self._purges[state] = watch
         self._may_be_open()
         self.arm()
 
@@ -124,10 +137,21 @@ class SampleGate:
             heapq.heappush(self._expiries, (change.expiry, self._expiry_count, info))
             self.arm()
 
-    def ended(self, key: bytes) -> None:
-        """The instance is not alive any more: nothing is expected of it."""
+    def ended(self, instance: Instance, now: float) -> None:
+        """The instance is not alive any more, as its state says: nothing is expected of it."""
         if self._deadline is not None:
-            self._deadline.forget(key)
+            self._deadline.forget(instance.key)
+        for state, purge in self._purges.items():
+            if state is instance.state:
+                purge.heard(instance.key, now)
+                self.arm()
+            else:
+                purge.forget(instance.key)
+
+    def revived(self, key: bytes) -> None:
+        """The instance is alive again."""
+        for purge in self._purges.values():
+            purge.forget(key)
 
     # --- the clock ---------------------------------------------------------------------------------------
 
@@ -136,6 +160,8 @@ class SampleGate:
         due = self._expiries[0][0] if self._expiries else math.inf
         if self._deadline is not None:
             due = min(due, self._deadline.due)
+        for purge in self._purges.values():
+            due = min(due, purge.due)
         if due < self._timer_due:
             self._timer_due = due
             self._on_timer(due)
@@ -155,6 +181,14 @@ class SampleGate:
             return []
         return self._deadline.missed(now)
 
+    def to_purge(self, now: float) -> list[bytes]:
+        """The instances that ended so long ago that nothing of them shall stay.  Asked when the timer rings."""
+        self._timer_due = math.inf
+        keys = [key for purge in self._purges.values() if purge.due <= now for key in purge.missed(now)]
+        for key in keys:
+            self.revived(key)
+        return keys
+
     @property
     def expiring(self) -> int:
         """How many samples are kept in mind because they will expire."""
@@ -165,3 +199,11 @@ class SampleGate:
         here = {id(info) for info in present}
         self._expiries = [entry for entry in self._expiries if id(entry[2]) in here]
         heapq.heapify(self._expiries)
+
+
+def _purge_delays(qos: EndpointQos) -> tuple[tuple[InstanceState, float], ...]:
+    policy = qos.reader_data_lifecycle
+    return (
+        (InstanceState.NOT_ALIVE_DISPOSED, policy.autopurge_disposed_samples_delay),
+        (InstanceState.NOT_ALIVE_NO_WRITERS, policy.autopurge_nowriter_samples_delay),
+    )

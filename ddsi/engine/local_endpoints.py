@@ -30,6 +30,7 @@ from ..structure.status import (
     RequestedIncompatibleQos,
     SampleLost,
     SampleRejected,
+    SampleRejectedKind,
     Status,
     SubscriptionMatched,
 )
@@ -37,6 +38,11 @@ from ..structure.status import (
 __all__ = ["KeyCodec", "LocalReader", "LocalWriter", "Octets"]
 
 Octets = bytes | bytearray | memoryview
+
+_REJECTED_BY = {
+    "max_instances": SampleRejectedKind.INSTANCES_LIMIT,
+    "max_samples_per_instance": SampleRejectedKind.SAMPLES_PER_INSTANCE_LIMIT,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,9 +209,15 @@ class LocalReader:
         self.deadline = RequestedDeadlineMissed(total_count=total, total_count_change=1, last_instance_handle=key)
         return self.deadline
 
-    def sample_rejected(self, reason: str) -> Status:
-        total = self.rejected.total_count + 1
-        self.rejected = SampleRejected(total_count=total, total_count_change=1, reason=reason)
+    def sample_rejected(self, limit: str, key: bytes) -> SampleRejected:
+        """``limit``: as the history calls it; octets of history count as samples."""
+        self.rejected = SampleRejected(
+            total_count=self.rejected.total_count + 1,
+            total_count_change=1,
+            last_reason=_REJECTED_BY.get(limit, SampleRejectedKind.SAMPLES_LIMIT),
+            last_instance_handle=key,
+            reason=limit,
+        )
         return self.rejected
 
     def inconsistent_topic(self, remote_type_name: str) -> Status:

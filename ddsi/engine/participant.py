@@ -330,7 +330,7 @@ class Participant:
             max_instances=self.config.max_instances,
             clock_offset=self._wall_clock() / 1e9 - now,
             on_news=lambda: self._effects.append(DataAvailable(guid)),
-            on_rejected=lambda reason: self._sample_rejected(guid, reason),
+            on_rejected=lambda limit, change, is_final: self._sample_rejected(guid, limit, change, is_final=is_final),
             on_timer=lambda due: self.alarms.reader(guid, due),
             wall_time=lambda now: self._wall_clock() / 1e9,
         )
@@ -597,10 +597,14 @@ class Participant:
         self.status(reader.guid, reader.samples_lost(1, f"sample {number} of {writer} does not decode: {detail}"))
         self.recorder.samples_lost(reader.guid, writer, number, number, SampleLossReason.MALFORMED_SAMPLE, detail)
 
-    def _sample_rejected(self, guid: Guid, reason: str) -> None:
-        is_by_instances = reason == "max_instances"
-        self.dropped(DropReason.TABLE_FULL_INSTANCES if is_by_instances else DropReason.READER_FULL, None, reason)
-        self.status(guid, self.local_readers[guid].sample_rejected(reason))
+    def _sample_rejected(self, guid: Guid, limit: str, change: CacheChange, *, is_final: bool) -> None:
+        """A reader has no room; a reliable writer will offer it again, so that it is not dropped."""
+        status = self.local_readers[guid].sample_rejected(limit, change.key)
+        if is_final:
+            is_by_instances = limit == "max_instances"
+            self.dropped(DropReason.TABLE_FULL_INSTANCES if is_by_instances else DropReason.READER_FULL, None, limit)
+        self.recorder.sample_rejected(guid, change, status.last_reason)
+        self.status(guid, status)
 
     def send_spdp(self, submessage: bytes, destinations: tuple[Locator, ...]) -> None:
         self.outbound.send_plain((submessage,), destinations)

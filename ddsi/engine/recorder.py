@@ -14,7 +14,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredParticipantData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
-from ..trace.reasons import DropReason, LossReason, SampleLossReason, SecurityStep
+from ..trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, SecurityStep
 from .effects import SendDatagram
 
 if TYPE_CHECKING:
@@ -124,6 +124,10 @@ class Recorder:
         self, reader: Guid, writer: Guid, first: int, last: int, reason: SampleLossReason, detail: str = ""
     ) -> None:
         self._put("SampleLost", reader, writer, first, last, reason, detail)
+
+    def sample_rejected(self, reader: Guid, change: CacheChange, reason: str) -> None:
+        if self._sink is not None:
+            self._put("SampleRejected", reader, change.writer_guid, change.sequence_number, RejectReason(reason))
 
     def liveliness(self, reader: Guid, writer: Guid, *, alive: bool) -> None:
         self._put("LivelinessChanged", reader, writer, alive)

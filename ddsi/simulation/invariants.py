@@ -105,7 +105,8 @@ def _taking_flaws(reader: NodeReader) -> Iterator[str]:
         if change.kind is ChangeKind.ALIVE
     ]
     # A best-effort reader without room accepts a sample only to reject it.
-    missing = len(given) - taken.total() - reader.local.rejected.total_count
+    rejected = 0 if reader.local.data.qos.is_reliable else reader.local.rejected.total_count
+    missing = len(given) - taken.total() - rejected
     may_expire = sum(change.expiry < math.inf for change in given)
     surplus = taken - Counter((bytes(change.writer_guid), change.sequence_number) for change in given)
     if surplus or not 0 <= missing <= may_expire:

@@ -6,6 +6,8 @@ before, so it serves as the value of the status too.  ``handle`` of a remote ent
 
 from __future__ import annotations
 
+from enum import StrEnum
+
 from .dataclass import dataclass
 from .guid import GUID_UNKNOWN, Guid
 
@@ -21,11 +23,21 @@ __all__ = [
     "RequestedIncompatibleQos",
     "SampleLost",
     "SampleRejected",
+    "SampleRejectedKind",
     "SecurityRefused",
     "SecurityRevoked",
     "Status",
     "SubscriptionMatched",
 ]
+
+
+class SampleRejectedKind(StrEnum):
+    """Which of a reader's resource limits refused a sample.  DDS 1.4 §2.2.4.1 (SampleRejectedStatusKind)."""
+
+    NOT_REJECTED = "not_rejected"
+    INSTANCES_LIMIT = "instances_limit"
+    SAMPLES_LIMIT = "samples_limit"
+    SAMPLES_PER_INSTANCE_LIMIT = "samples_per_instance_limit"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,10 +145,15 @@ class SampleLost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampleRejected:
-    """A sample was refused because of a resource limit, which ``reason`` names."""
+    """A reader's resource limit refused a sample; ``reason`` is the limit's name, ``last_reason`` the OMG's kind.
+
+    A best-effort sample is lost by that.  A reliable one counts once and is offered again when there is room.
+    """
 
     total_count: int = 0
     total_count_change: int = 0
+    last_reason: SampleRejectedKind = SampleRejectedKind.NOT_REJECTED
+    last_instance_handle: bytes = b""
     reason: str = ""
 
 

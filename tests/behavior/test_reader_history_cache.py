@@ -33,7 +33,7 @@ class Cache(ReaderHistoryCache):
             max_octets=max_octets,
             max_instances=max_instances,
             on_news=self._count_news,
-            on_rejected=self.rejected.append,
+            on_rejected=lambda limit, change, is_final: self.rejected.append(limit),
         )
 
     def _count_news(self) -> None:
@@ -288,7 +288,10 @@ def test_with_keep_last_an_end_stays_when_samples_are_pushed_out() -> None:
 def test_a_full_reliable_reader_lets_the_writer_wait(limits: ResourceLimits, keys: list[bytes], limit: str) -> None:
     cache = Cache(KEEP_ALL | Qos(resource_limits=limits))
     assert [cache.put(key) for key in keys] == [True, True, False]
-    assert cache.rejected == []
+    assert cache.rejected == [limit]
+    waiting = CacheChange(ChangeKind.ALIVE, guid(W1[0]), 3, bytes(4), keys[2])
+    assert not cache.add(waiting, now=4.0)
+    assert cache.rejected == [limit], "the same change again is no further rejection"
     cache.put(keys[0], BOTH)
     cache.take()
     assert cache.put(keys[2])
