@@ -11,7 +11,7 @@ from typing import Any
 
 from .buffers import needs_swap
 from .defaults import numpy_array, numpy_dtype
-from .layout import ALIGNED, UNKNOWN, Encoding, after, has_dheader, static_size
+from .layout import ALIGNED, UNKNOWN, Encoding, after, has_dheader
 from .model import (
     BOOLEAN,
     CHAR,
@@ -20,7 +20,6 @@ from .model import (
     BitmaskType,
     BitsetType,
     EnumType,
-    Extensibility,
     IdlType,
     MapType,
     Primitive,
@@ -32,12 +31,12 @@ from .model import (
 from .read_emitter import ReadEmitter
 from .recursion import FunctionPlan
 from .source import Source
+from .stride import Stride, stride
 
 __all__ = ["ValueReader", "enumerations", "numpy_numbers"]
 
 _IN_RUN = 256
-"""Arrays of primitives up to so many octets are part of a run; larger ones are copied only once.  And the most octets
-of an element that is read as one run."""
+"""Arrays of primitives up to so many octets are part of a run; larger ones are copied only once."""
 
 
 def numpy_numbers(type_: SequenceType | ArrayType, order: str, octets: Any, start: int, end: int) -> Any:
@@ -248,10 +247,9 @@ class ValueReader:
             self._enumeration_elements(element, count, value)
             return value
         emitter.then(f"{value} = []")
-        size = static_size(element, emitter.residue, encoding)
-        repeats = size is not None and size <= _IN_RUN and emitter.residue.advance(size) == emitter.residue
-        if size is not None and repeats and self._is_run(element):
-            self._elements_by_iter_unpack(element, count, value, size)
+        step = stride(element, emitter.residue, encoding)
+        if step is not None and not (count.isdecimal() and step.gap > 4):
+            self._elements_by_iter_unpack(element, count, value, step)
             return value
         residue = emitter.residue
         while (behind := residue.meet(after(element, residue, encoding))) != residue:
@@ -301,37 +299,40 @@ class ValueReader:
         emitter.then(f"{end} = {emitter.position} + {count} * {element.size}")
         emitter.move(end, residue)
 
-    def _is_run(self, element: IdlType) -> bool:
-        """Whether the element is a struct that is read as one run."""
-        if not isinstance(element, StructType) or has_dheader(element, self._encoding):
-            return False
-        return element.extensibility is not Extensibility.MUTABLE and all(
-            isinstance(member.type, (Primitive, EnumType, BitmaskType, BitsetType))
-            or (isinstance(member.type, ArrayType) and self._is_small(member.type))
-            or self._is_run(member.type)
-            for member in element.members
-        )
+    def _elements_by_iter_unpack(self, element: IdlType, count: str, value: str, step: Stride) -> None:
+        """All elements by one iterator in C: their layout is the same for each.
 
-    def _is_small(self, type_: ArrayType) -> bool:
-        element = type_.element
-        return isinstance(element, Primitive) and type_.count * element.size <= _IN_RUN and not type_.numpy
-
-    def _elements_by_iter_unpack(self, element: IdlType, count: str, value: str, size: int) -> None:
-        """All elements by one iterator in C: their layout is the same for each."""
+        The gap between elements is read as if it came before each.  In front of the first there are octets enough:
+        those of a count, or before an array at least the four of the encapsulation header.
+        """
         emitter, source = self._emitter, self._source
-        start, residue = emitter.position, emitter.residue
-        end = source.fresh("e")
-        emitter.then(f"{end} = {start} + {count} * {size}")
+        before, end = emitter.residue, source.fresh("e")
+        emitter.then(f"{end} = {emitter.position} + {self._octets_of_elements(count, step)}")
+        emitter.move(end, step.residue)
         with self._plan.inlining_all():  # at most as many structs as octets
             expression = self.value(element)
         codes, names = emitter.take_run()
-        leading = size - struct.calcsize(self._encoding.order + codes)  # where elements begin with padding
-        codes = f"{leading}x{codes}" if leading else codes
-        iterator = source.define("iter_unpack_", f'Struct("{self._encoding.order}{codes}").iter_unpack')
-        with source.block(f"for {', '.join(names)}, in {iterator}(d[{start}:{end}]):"):
+        behind = step.size - struct.calcsize(self._encoding.order + codes)  # octets that nobody wants
+        pieces = (f"{step.gap}x" if step.gap else "", codes, f"{behind}x" if behind else "")
+        iterator = source.define("iter_unpack_", f'Struct("{self._encoding.order}{"".join(pieces)}").iter_unpack')
+        octets = f"d[{end} - {count} * {step.octets}:{end}]"
+        with source.block(f"for {', '.join(names)}, in {iterator}({octets}):"):
             emitter.emit_held()
             source.line(f"{value}.append({expression})")
-        emitter.move(end, residue)
+        emitter.move(end, before.meet(step.residue.advance(step.size)))
+
+    def _octets_of_elements(self, count: str, step: Stride) -> str:
+        """The expression of what the elements take, padding before the first of them included."""
+        emitter = self._emitter
+        octets = f"{count} * {step.octets}" + (f" - {step.gap}" if step.gap else "")
+        padding = emitter.residue.padding(step.alignment)
+        if padding is None:
+            octets = f"(-({emitter.position} - {emitter.origin}) & {step.alignment - 1}) + {octets}"
+        elif padding:
+            octets = f"{padding} + {octets}"
+        elif not step.gap:
+            return octets
+        return f"({octets} if {count} else 0)"
 
     def _open_dheader(self, type_: IdlType) -> tuple[str, str] | None:
         if not has_dheader(type_, self._encoding):

@@ -18,6 +18,7 @@ from dataclasses import replace
 from ..structure.dataclass import dataclass
 from .layout import ALIGNED, UNKNOWN, Encoding, Residue
 from .source import Source
+from .stride import Stride
 
 __all__ = ["Position", "WriteEmitter"]
 
@@ -203,6 +204,24 @@ class WriteEmitter:
             self.flush()
             self.source.line(f"{name} = {self.position}")
         self.position = Position((name,), 0, residue)
+
+    @contextmanager
+    def repeat(self, head: str, count: str, step: Stride) -> Iterator[None]:
+        """The body runs ``count`` times and writes one element: a loop that need not know where it is."""
+        self.flush()
+        start = self.position
+        self.position = Position((), 0, step.residue)
+        with self.source.block(head):
+            yield
+            if step.gap:
+                self.pad(step.gap)
+            self.flush()
+        octets = f"{count} * {step.octets}"
+        if step.gap:  # behind the last element there is none
+            self.source.line(f"if {count}: parts[-1] = parts[-1][:-{step.gap}]")
+            octets = f"({octets} - {step.gap} if {count} else 0)"
+        residue = start.residue.meet(step.residue.advance(step.size))
+        self.position = Position((*start.terms, octets), start.offset, residue)
 
     @contextmanager
     def branches(self) -> Iterator[Branches]:

@@ -100,7 +100,7 @@ class _TypeWriter(ValueWriter):
         function = self._plan.function(type_)
         if function is None:
             with self._plan.inside():
-                self._body(type_, self._local("v", expression))
+                self._body(type_, expression if expression.isidentifier() else self._local("v", expression))
             return
         name, is_new = function
         if is_new:

@@ -10,7 +10,7 @@ import struct
 from typing import Any
 
 from .buffers import needs_swap
-from .layout import ALIGNED, UNKNOWN, Encoding, Residue, after, has_dheader, static_size
+from .layout import UNKNOWN, Encoding, after, has_dheader, static_size
 from .model import (
     BOOLEAN,
     CHAR,
@@ -29,6 +29,7 @@ from .model import (
 )
 from .recursion import FunctionPlan
 from .source import Source
+from .stride import Stride, stride
 from .write_emitter import Position, WriteEmitter
 
 __all__ = ["ValueWriter", "enum_values", "pack_numbers"]
@@ -145,19 +146,20 @@ class ValueWriter:
         residue = emitter.position.residue
         emitter.part(buffer, octets, residue.advance_multiple(element.size))
 
-    def _align_elements(self, count: str) -> None:
+    def _align_elements(self, count: str, alignment: int = 8) -> None:
         """In XCDR1 padding to 8 lies between count and elements, unless there are none (measured: s05)."""
         emitter = self._emitter
         residue = emitter.position.residue
-        padding = residue.padding(8)
+        padding = residue.padding(alignment)
+        behind = residue.meet(residue.align(alignment))
         if padding == 0:
             return
         if padding is None:
-            name = self._local("z", f"-({emitter.position}) & 7 if {count} else 0")
-            table = self._source.define("ZEROS_", repr(tuple(bytes(pad) for pad in range(8))))
-            emitter.part(f"{table}[{name}]", name, residue.meet(ALIGNED) if residue.modulus >= 4 else UNKNOWN)
+            name = self._local("z", f"-({emitter.position}) & {alignment - 1} if {count} else 0")
+            table = self._source.define("ZEROS_", repr(tuple(bytes(pad) for pad in range(alignment))))
+            emitter.part(f"{table}[{name}]", name, behind)
         else:
-            emitter.part(f"{bytes(padding)!r} if {count} else b''", f"({padding} if {count} else 0)", Residue(4, 0))
+            emitter.part(f"{bytes(padding)!r} if {count} else b''", f"({padding} if {count} else 0)", behind)
 
     def _sequence_buffer(self, type_: SequenceType, element: Primitive, expression: str) -> tuple[str, str]:
         source = self._source
@@ -257,11 +259,22 @@ class ValueWriter:
             octets = f"{count} * {element.size}"
             emitter.part(f"pack_numbers('{encoding.order}', '{element.code}', {value})", octets, residue)
             return
+        step = stride(element, emitter.position.residue, encoding)
+        if step is not None:
+            self._elements_by_stride(element, value, count, step)
+            return
         residue = emitter.position.residue
         while (behind := residue.meet(after(element, residue, encoding))) != residue:
             residue = behind
         item = self._source.fresh("v")
         with emitter.loop(f"for {item} in {value}:", residue), self._plan.inside():
+            self.value(element, item)
+
+    def _elements_by_stride(self, element: IdlType, value: str, count: str, step: Stride) -> None:
+        """Only the first element is aligned: the others follow it as their layout says."""
+        self._align_elements(count, step.alignment)
+        item = self._source.fresh("v")
+        with self._emitter.repeat(f"for {item} in {value}:", count, step), self._plan.inlining_all():
             self.value(element, item)
 
     def _open_dheader(self, type_: IdlType) -> tuple[str, Position] | None:
