@@ -137,7 +137,9 @@ class EngineThread:
         return call.outcome()
 
     def _begin(self, call: Call[R], lane: Lane | None) -> None:
-        if lane is not None:
+        if self._stop.is_set():
+            call.fail(AlreadyDeleted("the participant's engine has ended"))
+        elif lane is not None:
             lane.put(call)  # type: ignore[arg-type]  # a write: R is None
         else:
             assert self._nursery is not None
@@ -193,7 +195,7 @@ class EngineThread:
             call.fail(AlreadyDeleted("the participant's engine has ended"))
 
     def begin(self, function: Callable[[], Awaitable[None]]) -> None:
-        """In the engine's thread: run ``function`` as a task of its own."""
+        """In the engine's thread, where a participant is: run ``function`` as a task of its own."""
         assert self._nursery is not None
         self._nursery.start_soon(function)
 
@@ -222,7 +224,14 @@ class EngineThread:
         """Have it called in the engine's thread, or not at all; never waits, so that finalizers may call it."""
         if self._token is not None and not self._is_of_parent:
             with suppress(trio.RunFinishedError):
-                self._token.run_sync_soon(action)
+                self._token.run_sync_soon(self._perform, action)
+
+    @staticmethod
+    def _perform(action: Callable[[], object]) -> None:
+        try:
+            action()
+        except Exception:  # nobody waits for it, and raised here it would end the thread
+            _log.exception("what was posted to the engine's thread failed")
 
     def join(self) -> None:
         """If all have left, wait for the thread's end, which is near."""

@@ -73,8 +73,16 @@ class EntityPortal:
 
     @property
     def qos(self) -> Qos:
-        """The Qos that the entity was given."""
+        """The Qos that the entity has."""
         return self._entity.qos
+
+    def set_qos(self, qos: Qos) -> None:
+        """Change the policies that ``qos`` sets: see ``ddsi.Entity.set_qos``."""
+        self._ask(partial(self._entity.set_qos, qos))
+
+    def _ask(self, function: Callable[[], S]) -> S:
+        """What ``function``, which does not wait, says in the engine's thread."""
+        return self._engine.run_now(function)
 
     @property
     def is_closed(self) -> bool:
@@ -172,7 +180,7 @@ class ParticipantPortal(EntityPortal):
         self._ask(self._inner.assert_liveliness)
 
     def _ask(self, function: Callable[[], S]) -> S:
-        """In the engine's thread; of a participant that is not there, what it says of itself."""
+        """As of any entity; of a participant that is not there, what it says of itself."""
         if self._stay is None or self._inner.is_closed:
             return function()
         return self._engine.run_now(function)

@@ -233,3 +233,7 @@ def test_who_is_there_in_another_process() -> None:
             line = watcher.stdout.readline()
             assert line, f"it ended without {expected}"
             expected.discard(line.rstrip("\n"))
+
+
+def test_without_trio() -> None:
+    assert output_of(EXAMPLES / "08_without_trio.py") == ["2 + 2 = 4", "3 + 3 = 6", "5 + 5 = 10"]
