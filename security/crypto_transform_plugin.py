@@ -5,16 +5,16 @@ DDS-Security 1.1 §8.5.1.9; conventions: :mod:`ddsi_security.plugins`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ddsi.spi import Octets, Outcome, Overhead, Refused
 from ddsi.structure.dataclass import dataclass
 
 from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
 
-__all__ = ["CryptoTransform", "SecureSubmessage", "SecureSubmessageCategory"]
+__all__ = ["CryptoTransform", "OpensAlike", "SecureSubmessage", "SecureSubmessageCategory"]
 
 
 class SecureSubmessageCategory(Enum):
@@ -46,6 +46,7 @@ class CryptoTransform(Protocol):
     nothing is sent.  They encode for all receivers at once: the OMG's ``..._list_index`` has no part here.
     Decoders return the plain octets, or why there are none: not for us, no keys, rejected.  They may write into the
     octets that they are given, where these can be written to, and return parts of them: nobody reads them again.
+    What they return is read before the same decoder is called for the next one, and not after.
     """
 
     def overhead(
@@ -143,4 +144,21 @@ class CryptoTransform(Protocol):
         sending_datawriter_crypto: DatawriterCryptoHandle,
     ) -> Octets | Outcome:
         """§8.5.1.9.9.  A whole payload, or one run of fragments, as it was encoded."""
+        ...
+
+
+@runtime_checkable
+class OpensAlike(Protocol):
+    """What a CryptoTransform may offer besides, to make the path of every sample shorter.  Not the OMG's."""
+
+    def submessage_opener(
+        self,
+        encoded_rtps_submessage: Octets,
+        sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
+    ) -> Callable[[Octets], Octets | None] | None:
+        """A short way for submessages that begin with the same 16 octets as this one, which was just decoded.
+
+        It opens what decoding with the same handles would open, or returns None, and leaves the octets as they were;
+        then they are decoded.  It is used until keys or endpoints come or go.  None: there is no short way.
+        """
         ...

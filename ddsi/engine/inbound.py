@@ -161,11 +161,11 @@ class Inbound:
     def _submessages(self, incoming: Incoming, view: memoryview, start: int) -> None:
         """Dispatch what lies in ``view[start:]``.
 
-        DATA, INFO_TS and envelopes in their usual form are recognised here and take their short way; everything from
-        the first other submessage on is walked by ``iterate_submessages``, which knows all the rules.  Samples come in
-        long runs, so the walk returns to the short loop behind each HEARTBEAT or the like.
+        Submessages in their usual form - little-endian, with their length - are recognised here, and DATA, INFO_TS and
+        envelopes take a way of their own; all others are walked by ``iterate_submessages``, which knows all the rules,
+        one at a time, as samples come in long runs.
         """
-        position, end = start, len(view)
+        position, end, handlers = start, len(view), self._handlers
         unpack_head = SUBMESSAGE_HEAD.unpack_from
         while end - position >= 4:
             kind, flags, length = unpack_head(view, position)
@@ -186,6 +186,8 @@ class Inbound:
             elif kind == _INFO_TS and flags == 1 and length == 8 and position <= end:
                 seconds, fraction = _TIMESTAMP.unpack_from(view, body)
                 incoming.timestamp = seconds << 32 | fraction
+            elif flags & 1 and length and position <= end and not length & 3 and (handler := handlers.get(kind)):
+                handler(incoming, RawSubmessage(kind, flags, view[body:position], body - 4))
             else:
                 position = self._general_submessages(incoming, view, body - 4)
 
@@ -223,7 +225,12 @@ class Inbound:
             self.undecodable(decoded, incoming.source)
             return
         incoming.protection = outside | _IN_ENVELOPE
-        self._submessages(incoming, memoryview(decoded), 0)
+        length = len(decoded)
+        usual_head = (_DATA, _LE_DATA_ONLY, length - 4)
+        if length > 24 and not length & 3 and SUBMESSAGE_HEAD.unpack_from(decoded) == usual_head:
+            self._data(incoming, decoded, 4, length)
+        else:
+            self._submessages(incoming, memoryview(decoded), 0)
         incoming.protection = outside
 
     def undecodable(self, outcome: Outcome, source: Locator | None) -> None:
@@ -272,7 +279,7 @@ class Inbound:
 
     # --- DATA --------------------------------------------------------------------------------------------
 
-    def _data(self, incoming: Incoming, view: memoryview, start: int, end: int, key_hash: bytes = b"") -> None:
+    def _data(self, incoming: Incoming, view: Octets, start: int, end: int, key_hash: bytes = b"") -> None:
         """A sample in its usual form, its body at ``view[start:end]``: ``key_hash`` is all of its inline QoS, if any.
 
         The general form is :meth:`_general_data`; both end in :meth:`_change`.

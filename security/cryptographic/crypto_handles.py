@@ -19,6 +19,7 @@ from ddsi.spi import Refused
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
+from .aes_gcm import Scratch
 from .received_keys import KeyRing
 from .session_keys import ReceiverKey, SendingKey
 from .transformation import Protection
@@ -40,12 +41,16 @@ VOLATILE_PROTECTION: Final = Protection(encrypted=True)
 
 
 class LocalParticipant(ParticipantCryptoHandle):
-    """``key``: of whole messages; None where they are not protected.  ``protection`` likewise."""
+    """``key``: of whole messages; None where they are not protected.  ``protection`` likewise.
 
-    __slots__ = ("_last_key_id", "endpoints", "key", "key_bits", "max_blocks", "protection", "remotes")
+    ``scratch``: for large plain texts, of messages, submessages and payloads, which lie within each other.
+    """
+
+    __slots__ = ("_last_key_id", "endpoints", "key", "key_bits", "max_blocks", "protection", "remotes", "scratch")
 
     def __init__(self, protection: Protection | None, *, key_bits: int, max_blocks: int, first_key_id: int) -> None:
         self.protection = protection
+        self.scratch = (Scratch(), Scratch(), Scratch())
         self.key_bits = key_bits
         self.max_blocks = max_blocks
         self.key: SendingKey | None = None
@@ -94,9 +99,10 @@ class RemoteParticipant(ParticipantCryptoHandle):
     ) -> None:
         self.local = local
         self.exchange_key: SendingKey | None = exchange_key
-        self.exchange_ring = KeyRing(wall_clock)
+        of_messages, of_submessages, _ = local.scratch
+        self.exchange_ring = KeyRing(wall_clock, of_submessages)
         self.receiver_key = receiver_key
-        self.ring = KeyRing(wall_clock)
+        self.ring = KeyRing(wall_clock, of_messages)
         self.endpoints: set[RemoteWriter | RemoteReader] = set()
         self.volatile_writer: RemoteWriter | None = None
         self.volatile_reader: RemoteReader | None = None

@@ -40,6 +40,7 @@ from ddsi.structure.errors import MalformedMessage
 from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, MAC_LENGTH, Protection, TransformationKind
 
 __all__ = [
+    "ENVELOPE_KINDS",
     "FOOTER_LENGTH",
     "HEAD",
     "LONGEST_BODY",
@@ -49,6 +50,7 @@ __all__ = [
     "SEC_BODY",
     "SUBMESSAGE",
     "Envelope",
+    "body_head",
     "message_overhead",
     "read_envelope",
     "read_key_id",
@@ -76,6 +78,7 @@ _LONGEST_PADDING: Final = 3
 
 # As plain numbers, which compare quicker.
 SEC_BODY: Final = int(SubmessageKind.SEC_BODY)
+ENVELOPE_KINDS: Final = frozenset(range(SubmessageKind.SEC_BODY, SubmessageKind.SRTPS_POSTFIX + 1))
 MAY_BE_EMPTY: Final = (int(SubmessageKind.PAD), int(SubmessageKind.INFO_TS))
 
 _ENCRYPTED_KINDS: Final = frozenset(kind.to_wire() for kind in TransformationKind if kind.encrypts)
@@ -118,6 +121,13 @@ def submessage_overhead(protection: Protection | None, receivers: int) -> int:
 def message_overhead(protection: Protection | None, receivers: int) -> int:
     """What an envelope adds at most to a message, in octets: an INFO_SRC comes in addition."""
     return submessage_overhead(protection, receivers) + (HEAD.size + 20 if protection is not None else 0)
+
+
+# Few lengths are in use at a time, and to look one up is quicker than to pack it.
+@lru_cache(maxsize=256)
+def body_head(length: int) -> bytes:
+    """SEC_BODY up to the cipher text, which has so many octets."""
+    return HEAD.pack(SEC_BODY, 1, 4 + length + (-length & 3)) + length.to_bytes(4, "big")
 
 
 # --- reading: untrusted.  Raises MalformedMessage, and struct.error where the octets end before the envelope does.

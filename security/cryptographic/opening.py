@@ -17,21 +17,24 @@ from ddsi.spi import NOT_FOR_US, Octets, Outcome, Rejected
 from ddsi.structure.errors import MalformedMessage
 
 from .aes_gcm import LARGE, decrypt_joined
-from .envelope import HEAD, MAY_BE_EMPTY, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, read_envelope, swapped
+from .envelope import (
+    ENVELOPE_KINDS,
+    HEAD,
+    MAY_BE_EMPTY,
+    MESSAGE,
+    RECEIVER_MAC_LENGTH,
+    SUBMESSAGE,
+    Envelope,
+    read_envelope,
+    swapped,
+)
 from .received_keys import KeyRing
 from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, MAC_LENGTH, Protection
 
 __all__ = ["open_message", "open_submessage"]
 
-_USUAL_HEAD: Final = struct.Struct("<4s4s4s12s2sH4s")
-_USUAL_FOOT: Final = struct.Struct("<4s16s4s")
-_USUAL_OVERHEAD: Final = _USUAL_HEAD.size + _USUAL_FOOT.size
-_BODY: Final = bytes((SubmessageKind.SEC_BODY, 1))
-_NO_MACS: Final = bytes(4)
-
 _RTPS: Final = b"RTPS"
 _INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
-_ENVELOPE_KINDS: Final = frozenset(range(SubmessageKind.SEC_BODY, SubmessageKind.SRTPS_POSTFIX + 1))
 _ENDS_TOO_SOON: Final = "the octets end within the envelope"
 
 _Plain = bytes | bytearray | memoryview
@@ -43,7 +46,7 @@ def open_submessage(octets: Octets, ring: KeyRing, expected: Protection | None) 
     ``expected``: what the receiver's attributes ask for; None takes what the key says.
     """
     try:
-        plain = _open_usual(octets, ring, expected) or _open(SUBMESSAGE, octets, 0, ring, expected)
+        plain = _open(SUBMESSAGE, octets, 0, ring, expected)
         if not isinstance(plain, Outcome):
             _check_submessage(plain)
         return plain
@@ -80,35 +83,6 @@ def open_message(octets: Octets, ring: KeyRing, expected: Protection | None) -> 
     return whole[4:]
 
 
-def _open_usual(octets: Octets, ring: KeyRing, expected: Protection | None) -> bytes | None:
-    """The short way of what nearly all protected submessages are: small, encrypted for all receivers alike, under a key
-    and in a session that were used before.  None: :meth:`_open` knows, which does the same for all others.
-    """
-    length = len(octets)
-    if not _USUAL_OVERHEAD < length < LARGE or expected is None or expected.origin_authenticated:
-        return None
-    octets = bytes(octets)
-    head, kind_octets, key_id, nonce, body, body_length, count = _USUAL_HEAD.unpack_from(octets)
-    content_end = _USUAL_HEAD.size + int.from_bytes(count, "big")
-    postfix_at = length - _USUAL_FOOT.size
-    postfix, mac, macs = _USUAL_FOOT.unpack_from(octets, postfix_at)
-    keys = ring.by_id.get(key_id)
-    if (
-        head != SUBMESSAGE.prefix_head or body != _BODY or body_length != postfix_at - _USUAL_HEAD.size + 4
-        or not 0 <= postfix_at - content_end < 4 or postfix != SUBMESSAGE.postfix_head or macs != _NO_MACS
-        or keys is None or ring.previous is not None
-    ):  # fmt: skip
-        return None
-    key = keys[0]
-    session = key.sessions.get(nonce[:4])
-    if session is None or key.kind_octets != kind_octets or not key.encrypts or not expected.encrypted:
-        return None
-    try:
-        return session.aead.decrypt(nonce, octets[_USUAL_HEAD.size : content_end] + mac, None)
-    except InvalidTag:
-        return None
-
-
 def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: Protection | None) -> _Plain | Outcome:
     """What lies in the envelope that begins at ``octets[at]``.  Raises MalformedMessage, struct.error."""
     octets = bytes(octets) if len(octets) < LARGE else memoryview(octets)
@@ -126,7 +100,7 @@ def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: 
                 continue
         else:
             try:
-                plain = decrypt_joined(session.aead, nonce, octets, content_at, content_end, mac)
+                plain = decrypt_joined(session.aead, nonce, octets, content_at, content_end, mac, ring.scratch)
             except InvalidTag:
                 continue
         if expected is not None and expected.origin_authenticated:
@@ -159,5 +133,5 @@ def _check_submessage(plain: _Plain) -> None:
     # A length of 0 says "to the end", but of those that may be empty.
     if length != len(plain) - 4 and (length or kind in MAY_BE_EMPTY):
         raise MalformedMessage(f"{len(plain)} octets are not one submessage", element="envelope")
-    if kind in _ENVELOPE_KINDS:
+    if kind in ENVELOPE_KINDS:
         raise MalformedMessage("an envelope within an envelope", element="envelope")

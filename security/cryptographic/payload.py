@@ -21,7 +21,7 @@ from cryptography.exceptions import InvalidTag
 from ddsi.spi import Octets, Outcome, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
-from .aes_gcm import LARGE, append_encrypted
+from .aes_gcm import LARGE, Scratch, append_encrypted, decrypt_sealed
 from .received_keys import KeyRing, ReceivedKey
 from .session_keys import NONCE_AT, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
@@ -86,7 +86,7 @@ def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -
         return keys
     for key in keys:
         try:
-            return _open(octets, header, key)
+            return _open(octets, header, key, ring.scratch)
         except InvalidTag:
             continue
         except MalformedMessage as error:
@@ -120,7 +120,7 @@ def _open_usual(octets: bytes, ring: KeyRing, expected: Protection) -> bytes | N
         return None
 
 
-def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey) -> bytes | memoryview:
+def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey, scratch: Scratch) -> bytes | memoryview:
     """Raises InvalidTag, MalformedMessage."""
     mac_at = len(octets) - _FOOTER_LENGTH
     if key.encrypts:
@@ -135,7 +135,7 @@ def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey) -> bytes 
     session = key.sessions.get(session_id) or key.derive(session_id)
     plain = octets[HEADER_LENGTH:mac_at]
     if key.encrypts:
-        plain = session.aead.decrypt(nonce, octets[_CONTENT_AT:end], None)
+        plain = decrypt_sealed(session.aead, nonce, octets[_CONTENT_AT:end], scratch)
     elif not compare_digest(session.aead.encrypt(nonce, b"", plain), octets[mac_at:end]):
         raise InvalidTag
     if session_id not in key.sessions:

@@ -14,6 +14,7 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from ddsi.spi import NoKeys, Outcome, Rejected
 
+from .aes_gcm import Scratch
 from .key_material import KeyMaterial
 from .session_keys import session_key, session_receiver_key
 from .transformation import Protection, TransformationKind
@@ -78,9 +79,11 @@ class KeyRing:
     ``by_id``: one or two for each id, the newest first, as both may have one id.  A third drives out the oldest.
     """
 
-    __slots__ = ("_clock", "_previous_ends", "by_id", "current", "previous")
+    __slots__ = ("_clock", "_previous_ends", "by_id", "current", "previous", "scratch")
 
-    def __init__(self, wall_clock: Callable[[], int]) -> None:
+    def __init__(self, wall_clock: Callable[[], int], scratch: Scratch | None = None) -> None:
+        """``scratch``: where large octets are decrypted to; it may serve all rings of one purpose."""
+        self.scratch = Scratch() if scratch is None else scratch
         self.current: ReceivedKey | None = None
         self.previous: ReceivedKey | None = None
         self._clock = wall_clock

@@ -13,7 +13,7 @@ from ddsi.messages.raw_submessage import SubmessageKind
 from ddsi.spi import Octets, Refused
 
 from .aes_gcm import LARGE, append_encrypted
-from .envelope import FOOTER_LENGTH, HEAD, LONGEST_BODY, MESSAGE, RECEIVER_MAC_LENGTH, SEC_BODY, SUBMESSAGE, Envelope
+from .envelope import FOOTER_LENGTH, HEAD, LONGEST_BODY, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, body_head
 from .payload import USED_UP
 from .session_keys import NONCE_AT, ReceiverKey, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH
@@ -77,9 +77,9 @@ def _seal(
     elif length < LARGE:
         sealed = key.aead.encrypt(nonce, head + body if head else body, None)
         mac = sealed[-MAC_LENGTH:]
-        buffer += b"".join((envelope.prefix_head, header, _body_head(length), sealed[:-MAC_LENGTH]))
+        buffer += b"".join((envelope.prefix_head, header, body_head(length), sealed[:-MAC_LENGTH]))
     else:
-        buffer += envelope.prefix_head + header + _body_head(length)
+        buffer += envelope.prefix_head + header + body_head(length)
         spare = FOOTER_LENGTH + RECEIVER_MAC_LENGTH * len(receivers) + 8
         plain = b"".join((head, body)) if head else body
         mac = append_encrypted(buffer, plain, key.aead, nonce, spare=spare)
@@ -92,13 +92,6 @@ def _seal(
         parts += receiver.key_id, receiver.mac(key, nonce, mac)
     buffer += b"".join(parts)
     return None
-
-
-# Few lengths are in use at a time, and to look one up is quicker than to pack it.
-@lru_cache(maxsize=256)
-def _body_head(length: int) -> bytes:
-    """SEC_BODY up to the cipher text, which has so many octets."""
-    return HEAD.pack(SEC_BODY, 1, 4 + length + (-length & 3)) + length.to_bytes(4, "big")
 
 
 @lru_cache(maxsize=256)

@@ -7,7 +7,7 @@ decided here; what is done with them in :mod:`.payload` and :mod:`.envelope`.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, cast
 
 from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Refused, Rejected
@@ -15,7 +15,7 @@ from ddsi.structure.errors import MalformedMessage
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
-from . import envelope, opening, payload, sealing
+from . import envelope, opening, payload, sealing, submessage_opener
 from .crypto_handles import (
     NO_KEY,
     LocalParticipant,
@@ -180,6 +180,18 @@ class AesGcmGmacTransform:
         sender = sending_datareader_crypto
         assert isinstance(sender, RemoteReader)
         return opening.open_submessage(encoded_rtps_submessage, sender.ring, sender.writer.submessage)
+
+    def submessage_opener(
+        self,
+        encoded_rtps_submessage: Octets,
+        sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
+    ) -> Callable[[Octets], Octets | None] | None:
+        """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.OpensAlike`."""
+        sender = sending_crypto
+        assert isinstance(sender, RemoteWriter | RemoteReader)
+        expected = sender.reader.submessage if isinstance(sender, RemoteWriter) else sender.writer.submessage
+        opener = submessage_opener.submessage_opener(encoded_rtps_submessage, sender.ring, expected)
+        return None if opener is None else opener.open
 
     def decode_serialized_payload(
         self,

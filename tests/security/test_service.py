@@ -17,6 +17,7 @@ from ddsi.spi import (
     SPI_VERSION,
     NoKeys,
     NotForUs,
+    Outcome,
     Refused,
     Rejected,
     SendMessage,
@@ -211,6 +212,23 @@ def test_what_one_protects_the_other_opens(governance: str) -> None:
     assert bytes(received).endswith(protected)
     if protected != plain:
         assert bytes(bob.open(protected, alice)) == plain  # type: ignore[arg-type]
+
+
+def test_what_follows_the_first_is_judged_by_the_same_rules() -> None:
+    """It goes a shorter way, until its endpoint is gone."""
+    alice, bob = trusting_pair()
+    writer, reader = ids.SEDP_PUBLICATIONS_SECURE_WRITER, ids.SEDP_PUBLICATIONS_SECURE_READER
+    receiver, plain = bob.endpoint(reader), heartbeat(writer, reader)
+    for _ in range(3):
+        assert bytes(bob.open(alice.protect(writer, receiver, plain), alice)) == plain  # type: ignore[arg-type]
+    assert bob.hooks._protection._openers, "the shorter way is there"
+    posing = alice.protect(writer, receiver, heartbeat(ids.SEDP_SUBSCRIPTIONS_SECURE_WRITER, reader))
+    assert isinstance(bob.open(posing, alice), Rejected)
+    altered = bytearray(alice.protect(writer, receiver, plain))
+    altered[40] ^= 1
+    assert isinstance(bob.open(bytes(altered), alice), Rejected)
+    bob.hooks.unmatch(bob.endpoint(reader), alice.endpoint(writer))
+    assert isinstance(bob.open(alice.protect(writer, receiver, plain), alice), Outcome)
 
 
 def test_a_payload_is_opened_by_the_reader_it_is_for() -> None:

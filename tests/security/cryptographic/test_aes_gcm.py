@@ -40,9 +40,10 @@ def test_decrypting_joins_cipher_text_and_tag(size: int, kind: type) -> None:
     plain = random.Random(size).randbytes(size)
     sealed = AEAD.encrypt(NONCE, plain, None)
     encrypted, tag = kind(sealed[:-16]), sealed[-16:]
-    found = aes_gcm.decrypt_joined(AEAD, NONCE, encrypted, 0, len(encrypted), tag)
+    scratch = aes_gcm.Scratch()
+    found = aes_gcm.decrypt_joined(AEAD, NONCE, encrypted, 0, len(encrypted), tag, scratch)
     assert found == plain
-    assert isinstance(found, bytearray) is (size >= aes_gcm.LARGE)
+    assert isinstance(found, memoryview) is (size >= aes_gcm.LARGE)
     assert encrypted == sealed[:-16], "what came is left as it was"
     with pytest.raises(InvalidTag):
-        aes_gcm.decrypt_joined(AEAD, NONCE, encrypted, 0, len(encrypted), bytes(16))
+        aes_gcm.decrypt_joined(AEAD, NONCE, encrypted, 0, len(encrypted), bytes(16), scratch)

@@ -1,0 +1,120 @@
+"""The short way of a protected submessage: what a sender protects as it did before is opened as it was before.
+
+DDS-Security 1.1 §9.5.3.3 (decode_datawriter_submessage, decode_datareader_submessage).  Whose submessage it is, under
+which key and in which session, its first 16 octets tell, and nearly all of one sender begin with the same ones.
+:mod:`.opening` is the general way, which opens the first; a test holds both against each other.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Final
+
+from cryptography.exceptions import InvalidTag
+from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+
+from ddsi.spi import Octets
+
+from .aes_gcm import LARGE, Scratch, decrypt_sealed
+from .envelope import ENVELOPE_KINDS, HEAD, SUBMESSAGE, body_head
+from .received_keys import KeyRing
+from .transformation import MAC_LENGTH, Protection
+
+__all__ = ["SubmessageOpener", "submessage_opener"]
+
+_NONCE_AT: Final = 12
+_BODY_AT: Final = 24
+_CONTENT_AT: Final = 32
+_FOOT: Final = 24
+"""SEC_POSTFIX with its header, without receiver-specific MACs."""
+_POSTFIX_HEAD: Final = SUBMESSAGE.postfix_head
+_NO_MACS: Final = bytes(4)
+_LEAST: Final = _CONTENT_AT + 4 + _FOOT
+"""Octets around the content of a submessage, and its header."""
+
+
+class SubmessageOpener:
+    """For submessages that begin with the same 16 octets: encrypted, for all receivers alike, in one session."""
+
+    __slots__ = ("_aead", "_decrypt", "_scratch")
+
+    def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
+        self._aead = aead
+        self._decrypt = aead.decrypt
+        self._scratch = scratch
+
+    def open(self, octets: Octets) -> Octets | None:
+        """The one submessage in ``octets``, little-endian and with its length; else None, and they are as they were.
+
+        None also where they were altered: the general way says in what.
+        """
+        length = len(octets)
+        if length >= LARGE or not isinstance(octets, bytes):
+            plain = self._open_large(memoryview(octets))
+            if plain is None:
+                return None
+        elif length < _LEAST:
+            return None
+        else:
+            take_apart, expected_head = _layout(length)
+            nonce, head, cipher_text, postfix_head, mac, count = take_apart(octets)
+            if head != expected_head or postfix_head != _POSTFIX_HEAD or count != _NO_MACS:
+                return None
+            try:
+                plain = self._decrypt(nonce, cipher_text + mac, None)
+            except InvalidTag:
+                return None
+        kind, flags, following = HEAD.unpack_from(plain)
+        if not flags & 1 or following != length - _LEAST or kind in ENVELOPE_KINDS:
+            return None
+        return plain
+
+    def _open_large(self, octets: memoryview) -> Octets | None:
+        """Without copying, where ``octets`` can be written to: the MAC goes for a while to where AES-GCM wants it."""
+        length = len(octets)
+        foot = bytes(octets[-_FOOT:])
+        mac = foot[4 : 4 + MAC_LENGTH]
+        if length < _LEAST or length & 3 or foot != _POSTFIX_HEAD + mac + _NO_MACS:
+            return None
+        if octets[_BODY_AT:_CONTENT_AT] != body_head(length - _CONTENT_AT - _FOOT):
+            return None
+        if octets.readonly:
+            sealed: Octets = b"".join((octets[_CONTENT_AT:-_FOOT], mac))
+        else:
+            octets[-_FOOT : MAC_LENGTH - _FOOT] = mac
+            sealed = octets[_CONTENT_AT : MAC_LENGTH - _FOOT]
+        try:
+            return decrypt_sealed(self._aead, bytes(octets[_NONCE_AT:_BODY_AT]), sealed, self._scratch)
+        except InvalidTag:
+            return None
+        finally:
+            if not octets.readonly:
+                octets[-_FOOT:] = foot
+
+
+# Few lengths are in use at a time, and one call that takes all apart is quicker than a slice for each.
+@lru_cache(maxsize=256)
+def _layout(length: int) -> tuple[Callable[[bytes], tuple[bytes, ...]], bytes]:
+    """Of an envelope with so many octets: its parts, from the nonce on, and the head of SEC_BODY as it must be."""
+    content = length - _CONTENT_AT - _FOOT
+    parts = struct.Struct(f"{_NONCE_AT}x12s8s{content}s4s{MAC_LENGTH}s4s")
+    return parts.unpack, b"" if length & 3 else body_head(content)
+
+
+def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> SubmessageOpener | None:
+    """Opens what begins as ``octets``, which were opened with this ring; None where the usual form is not expected.
+
+    It holds until the ring changes.
+    """
+    head, kind_octets, key_id, session_id = (bytes(octets[at : at + 4]) for at in (0, 4, 8, 12))
+    keys = ring.by_id.get(key_id)
+    if expected is None or not expected.encrypted or expected.origin_authenticated or ring.previous is not None:
+        return None
+    if head != SUBMESSAGE.prefix_head or keys is None:
+        return None
+    session = keys[0].sessions.get(session_id)
+    if session is None or keys[0].kind_octets != kind_octets or not keys[0].encrypts:
+        return None
+    return SubmessageOpener(session.aead, ring.scratch)

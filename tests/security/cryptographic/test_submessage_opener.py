@@ -1,0 +1,109 @@
+"""The short way of protected submessages: it opens what the general way opens, and touches nothing else."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from ddsi_security.cryptographic.aes_gcm import LARGE
+from ddsi_security.cryptographic.opening import open_submessage
+from ddsi_security.cryptographic.received_keys import KeyRing
+from ddsi_security.cryptographic.sealing import seal_submessage
+from ddsi_security.cryptographic.session_keys import SendingKey
+from ddsi_security.cryptographic.submessage_opener import SubmessageOpener, submessage_opener
+from ddsi_security.cryptographic.transformation import Protection, TransformationKind
+from tests.security.cryptographic.keys import material, ring, sending_key
+
+ENCRYPTED = Protection(encrypted=True)
+SIZES = (8, 400, LARGE - 60, LARGE - 56, 65_000)
+
+
+def submessage(size: int, kind: int = 0x15, flags: int = 5) -> bytes:
+    return struct.pack("<BBH", kind, flags, size - 4) + bytes(size - 4)
+
+
+def sealed(plain: bytes, key: SendingKey) -> bytes:
+    buffer = bytearray()
+    assert seal_submessage(buffer, plain, key, ()) is None
+    return bytes(buffer)
+
+
+def opener_of(first: bytes, keys: KeyRing) -> SubmessageOpener:
+    assert open_submessage(first, keys, ENCRYPTED) is not None
+    found = submessage_opener(first, keys, ENCRYPTED)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("kind", [bytes, bytearray, lambda octets: memoryview(bytearray(octets)), memoryview])
+def test_it_opens_what_follows_in_the_same_session(size: int, kind: type) -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    found = opener.open(kind(sealed(submessage(size), key)))
+    assert found is not None
+    assert bytes(found) == submessage(size)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("at", [12, 24, 26, 28, 40, -24, -20, -5, -1])
+def test_what_was_altered_is_left_to_the_general_way_and_as_it_was(size: int, at: int) -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    altered = bytearray(sealed(submessage(max(size, 16)), key))
+    altered[at] ^= 1
+    before = bytes(altered)
+    assert opener.open(altered) is None
+    assert opener.open(before) is None
+    assert altered == before
+
+
+@pytest.mark.parametrize("length", [1, 16, 32, 56, 58, 60])
+def test_octets_that_end_too_soon_are_none(length: int) -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    octets = sealed(submessage(24), key)
+    assert opener.open(octets[:length]) is None
+    assert opener.open(octets[-length:]) is None
+
+
+@pytest.mark.parametrize(
+    "plain",
+    [
+        submessage(24, flags=4),
+        submessage(24, kind=0x31),
+        submessage(24)[:2] + bytes(2) + submessage(24)[4:],
+        submessage(24) + bytes(4),
+    ],
+    ids=["big-endian", "an envelope", "of length 0", "two submessages"],
+)
+def test_unusual_submessages_are_left_to_the_general_way(plain: bytes) -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    assert opener.open(sealed(plain, key)) is None
+
+
+def test_there_is_none_where_more_is_asked_for_than_encryption_for_all() -> None:
+    keys, first = ring(material()), sealed(submessage(24), sending_key())
+    assert submessage_opener(first, keys, ENCRYPTED) is None, "nothing was opened in this session yet"
+    assert open_submessage(first, keys, ENCRYPTED) is not None
+    assert submessage_opener(first, keys, ENCRYPTED) is not None
+    assert submessage_opener(first, keys, None) is None
+    assert submessage_opener(first, keys, Protection(encrypted=False)) is None
+    assert submessage_opener(first, keys, Protection(encrypted=True, origin_authenticated=True)) is None
+    assert submessage_opener(first[:8] + b"\x99" * 4 + first[12:], keys, ENCRYPTED) is None
+
+
+def test_there_is_none_while_a_key_is_being_replaced() -> None:
+    keys, first = ring(material()), sealed(submessage(24), sending_key())
+    assert open_submessage(first, keys, ENCRYPTED) is not None
+    keys.replace(material(TransformationKind.AES256_GMAC))
+    assert submessage_opener(first, keys, ENCRYPTED) is None
+
+
+def test_there_is_none_for_what_is_signed() -> None:
+    of = material(TransformationKind.AES256_GMAC)
+    keys, signed = ring(of), sealed(submessage(24), sending_key(of))
+    assert open_submessage(signed, keys, Protection(encrypted=False)) == submessage(24)
+    assert submessage_opener(signed, keys, Protection(encrypted=False)) is None
