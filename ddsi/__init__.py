@@ -117,7 +117,7 @@ from .structure.status import (
     SubscriptionMatched,
 )
 from .structure.time import Time
-from .xtypes import deserialize, idl, key_hash, serialize, type_information
+from .xtypes import deserialize, dynamic_type, idl, key_hash, serialize, type_information, type_objects
 
 XCDR1 = DataRepresentationId.XCDR1
 XCDR2 = DataRepresentationId.XCDR2
@@ -218,9 +218,11 @@ __all__ = [
     "Volatile",
     "WriterDataLifecycle",
     "deserialize",
+    "dynamic_type",
     "idl",
     "key_hash",
     "secure",
     "serialize",
     "type_information",
+    "type_objects",
 ]

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..structure.errors import BadParameter
 from ..structure.qos_policies import DataRepresentationId
-from .model import StructType, UnionType
+from .model import Composite, StructType, UnionType
 from .resolution import named_type
 from .type_support import SUPPORT_ATTRIBUTE, Octets, TypeSupport, type_support
 
 if TYPE_CHECKING:
     from .type_object import TypeInformation
 
-__all__ = ["deserialize", "key_hash", "serialize", "type_information"]
+__all__ = ["composite_of", "deserialize", "key_hash", "serialize", "type_information"]
 
 T = TypeVar("T")
 
@@ -93,7 +93,12 @@ def type_information(python_class: type[Any]) -> TypeInformation:
     """
     from .type_object import describe
 
+    return describe(composite_of(python_class)).information
+
+
+def composite_of(python_class: type[Any]) -> Composite:
+    """The struct or union that a class is.  BadParameter if it is neither."""
     found = named_type(python_class)
     if not isinstance(found, (StructType, UnionType)):
         raise BadParameter(f"{python_class.__name__} is no topic type; decorate a class with @idl.struct")
-    return describe(found).information
+    return found

@@ -34,7 +34,7 @@ from ..model import (
     UnionType,
 )
 from .expressions import KEYWORDS
-from .python_names import literal_identifier
+from .python_names import literal_name_in_idl
 
 __all__ = ["idl_text"]
 
@@ -173,9 +173,7 @@ def _escaped(name: str) -> str:
 
 def _literal_name(literal: enum.IntEnum | enum.IntFlag) -> str:
     """The name in IDL: without the underscore that only Python needs."""
-    name = literal.name or ""
-    bare = name.rstrip("_")
-    return _escaped(bare if bare != name and literal_identifier(bare) == name else name)
+    return _escaped(literal_name_in_idl(literal.name or ""))
 
 
 # --- definitions -------------------------------------------------------------------------------------------

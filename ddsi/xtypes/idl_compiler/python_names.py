@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from .declarations import Declaration, Module
 
-__all__ = ["literal_identifier", "python_identifier", "python_names"]
+__all__ = ["literal_identifier", "literal_name_in_idl", "python_identifier", "python_names"]
 
 _USED_BY_GENERATED_SOURCE = frozenset(
     ("Annotated", "Final", "TypeAlias", "annotations", "bool", "enum", "field", "float", "idl", "int", "str")
@@ -32,6 +32,12 @@ def python_identifier(name: str, taken: Iterable[str] = ()) -> str:
 def literal_identifier(name: str) -> str:
     """The name of an enum's literal, which must not be what every Python enum has."""
     return python_identifier(name, _ENUM_ATTRIBUTES)
+
+
+def literal_name_in_idl(name: str) -> str:
+    """The other way: the name of a literal or flag without the underscores that only Python needs."""
+    bare = name.rstrip("_")
+    return bare if bare != name and literal_identifier(bare) == name else name
 
 
 def python_names(root: Module, declarations: Iterable[Declaration]) -> dict[Declaration, str]:

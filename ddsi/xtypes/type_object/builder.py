@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from ...structure.dataclass import dataclass
 from ...structure.errors import BadParameter
 from ..components import strongly_connected
+from ..idl_compiler.python_names import literal_name_in_idl
 from ..model import (
     ArrayType,
     BitmaskType,
@@ -175,7 +176,7 @@ class _Builder:
             case EnumType():
                 return _enum(type_)
             case BitmaskType():
-                bits = {flag.value.bit_length() - 1: str(flag.name) for flag in type_.python_class}
+                bits = {flag.value.bit_length() - 1: literal_name_in_idl(str(flag.name)) for flag in type_.python_class}
                 bitflags = tuple(BitflagObject(position, named(bits[position])) for position in sorted(bits))
                 return BitmaskObject(TypeFlag.FINAL, type_.bit_bound, bitflags, name)
             case BitsetType():
@@ -194,7 +195,7 @@ class _Builder:
     def _case(self, case: Case) -> CaseObject:
         type_ = self._identifier(case.type, case.typedefs)
         flags = _member_flags(case) | (MemberFlag.DEFAULT if case.is_default else MemberFlag(0))
-        labels = tuple(ord(label) if isinstance(label, str) else int(label) for label in case.labels)
+        labels = tuple(_int32(ord(label) if isinstance(label, str) else int(label)) for label in case.labels)
         return CaseObject(case.id, flags, type_, labels, named(case.name_in_idl), case.hash_name)
 
 
@@ -304,10 +305,17 @@ def _member_flags(member: Member) -> MemberFlag:
     return flags
 
 
+def _int32(label: int) -> int:
+    """A label as a TypeObject has it, which knows none of more than 32 bits and none without a sign."""
+    return (label + (1 << 31)) % (1 << 32) - (1 << 31)
+
+
 def _enum(enum: EnumType) -> EnumObject:
     literals = tuple(
         LiteralObject(
-            literal.value, MemberFlag.DEFAULT if literal is enum.default else MemberFlag(0), named(literal.name)
+            literal.value,
+            MemberFlag.DEFAULT if literal is enum.default else MemberFlag(0),
+            named(literal_name_in_idl(literal.name)),
         )
         for literal in sorted(enum.python_class)
     )

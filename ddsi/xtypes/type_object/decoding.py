@@ -82,7 +82,7 @@ class _Part:
         return StructObject(flags, None if base == _NO_TYPE else base, self._sequence(self._member), type_name)
 
     def _member(self) -> MemberObject:
-        return MemberObject(*self._common(), self._name())
+        return MemberObject(*self._common(), *self._name_and_hashed())
 
     def _common(self) -> tuple[int, MemberFlag, TypeIdentifier]:
         reader = self._reader
@@ -100,7 +100,7 @@ class _Part:
     def _case(self) -> CaseObject:
         common = self._common()
         labels = tuple(self._reader.i32() for _ in range(self._reader.count(least_octets=4)))
-        return CaseObject(*common, labels, self._name())
+        return CaseObject(*common, labels, *self._name_and_hashed())
 
     def alias(self) -> AliasObject:
         reader = self._reader
@@ -224,6 +224,21 @@ class _Part:
         text = self._text()
         self._skip_annotations()
         return named(text)
+
+    def _name_and_hashed(self) -> tuple[Named, str | None]:
+        """The name of a member, and what ``@hashid`` was given if it was there."""
+        if not self._is_complete:
+            return self._name(), None
+        text, hash_name = self._text(), None
+        if self._reader.boolean():
+            with self._reader.delimited():
+                # The specification puts unit, minimum and maximum before it.  Where one of these is there, the
+                # rest is left: member ids say all that matters.
+                if not any(self._reader.octets(3)) and self._reader.boolean():
+                    hash_name = self._reader.string()
+        if self._reader.boolean():
+            self._reader.skip_delimited()
+        return named(text), hash_name
 
     def _text(self) -> str:
         text = self._reader.string()

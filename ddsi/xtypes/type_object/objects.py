@@ -2,7 +2,7 @@
 
 Minimal and complete TypeObjects are the same classes.  A complete one has names; a minimal one has the first four
 octets of the MD5 of each member's name.  Annotations that mean nothing to the encoding (units, ranges, custom ones) are
-not kept; ``hash_name``, what ``@hashid`` was given, is written and not read, since the member id says all of it.
+not kept, but for ``hash_name``: what ``@hashid`` was given.
 """
 
 from __future__ import annotations
