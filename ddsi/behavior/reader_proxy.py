@@ -13,6 +13,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredReaderData
 from ..structure.guid import GUID_UNKNOWN, EntityId, Guid
 from ..structure.locator import Locator
+from .content_filter import ContentFilter
 from .schedules import NACK_RESPONSE_SUPPRESSION, heartbeat_period
 
 __all__ = ["ReaderProxy"]
@@ -34,6 +35,7 @@ class ReaderProxy:
         "_resent",
         "_unanswered",
         "acked_sn",
+        "content_filter",
         "data",
         "guid",
         "heartbeat_due",
@@ -54,6 +56,7 @@ class ReaderProxy:
         self.data = data
         self.guid: Guid = data.guid
         self.locators = locators
+        self.content_filter: ContentFilter | None = None  # what the writer evaluates for it
         self.is_reliable = data.qos.is_reliable
         self.history_sn = history_sn
         self.acked_sn = history_sn
@@ -90,8 +93,11 @@ class ReaderProxy:
     def is_relevant(self, change: CacheChange) -> bool:
         """Is the change meant for this reader?  RTPS 2.5 §8.4.7.5 (DDS_FILTER), DDS-Security 1.1 §7.4.4.4.
 
-        Its destination is nobody in particular, this reader, or this reader's participant.
+        Its destination is nobody in particular, this reader, or this reader's participant; and it passes the reader's
+        content filter, where the writer evaluates that.
         """
+        if self.content_filter is not None and not self.content_filter.passes(change):
+            return False
         destination = change.destination
         return destination == GUID_UNKNOWN or destination == self._participant or destination == self.guid
 

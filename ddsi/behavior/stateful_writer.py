@@ -22,6 +22,7 @@ from ..structure.qos import EndpointQos
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason
 from .acked_numbers import AckedNumbers
+from .content_filter import ContentFilter
 from .deadline_watch import DeadlineWatch
 from .dropping import WhenDropped, drop_silently
 from .filtered import directed_heartbeat_range, gap_for, is_irrelevant
@@ -194,11 +195,19 @@ class StatefulWriter:
     # --- matching ----------------------------------------------------------------------------------------
 
     def matched_reader_add(
-        self, data: DiscoveredReaderData, locators: tuple[Locator, ...], now: float
+        self,
+        data: DiscoveredReaderData,
+        locators: tuple[Locator, ...],
+        now: float,
+        content_filter: ContentFilter | None = None,
     ) -> list[WriterTransmission]:
-        """RTPS 2.5 §8.4.7.3.1.  A reliable reader is told at once what there is, lest it waits or asks."""
+        """RTPS 2.5 §8.4.7.3.1.  A reliable reader is told at once what there is, lest it waits or asks.
+
+        ``content_filter``: what this reader lets pass, for a writer that acts on it.
+        """
         proxy = ReaderProxy(data, locators, history_sn=self._history_sn_for(data, self.next_unsent_sn - 1), now=now)
         proxy.match_sn = self.next_unsent_sn - 1
+        proxy.content_filter = content_filter
         self._proxy_added(proxy)
         self._forget_reader(data.guid)
         self.readers[data.guid] = proxy
@@ -456,7 +465,7 @@ class StatefulWriter:
         proxy.answered(now)
         self._discount(proxy)
         was_stalled, proxy.is_stalled = proxy.is_stalled, False
-        is_news = proxy.acked_changes_set(min(requested.base - 1, self.cache.last_sn))
+        is_news = proxy.acked_changes_set(self._committed_sn(proxy, requested.base - 1))
         self._count(proxy)
         if is_news or was_stalled:
             self._acknowledged(proxy, now)
@@ -467,6 +476,10 @@ class StatefulWriter:
             self.heartbeat.written(now)
         out.extend(self.unsent_changes(now))
         return out
+
+    def _committed_sn(self, proxy: ReaderProxy, acknowledged_sn: int) -> int:
+        """How far (inclusive) a reader needs nothing any more that says it has all up to there."""
+        return min(acknowledged_sn, self.cache.last_sn)
 
     def _requested_changes(self, proxy: ReaderProxy, requested: NumberSet, now: float) -> list[WriterTransmission]:
         """Send again what is here, and a GAP for what is not.  RTPS 2.5 §8.4.7.5.3, §8.4.9.2.10-12."""

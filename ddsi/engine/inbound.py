@@ -16,6 +16,7 @@ from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.writer_proxy import WriterProxy
 from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.acknack import AckNack, NackFrag
+from ..messages.content_filter_info import decode_content_filter_info
 from ..messages.data import Data
 from ..messages.data_frag import DataFrag
 from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD, envelope_end, key_hash_alone
@@ -371,6 +372,7 @@ class Inbound:
             key_hash=inline.key_hash,
             related=inline.related,
         )
+        change.verdicts = inline.verdicts
         self._change(incoming, remote, reader_id, change)
 
     def _nothing(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, number: int) -> None:
@@ -664,12 +666,13 @@ def _check_number(number: int, raw: RawSubmessage) -> None:
 class _InlineQos:
     """What a DATA's inline QoS says that concerns receiving it.  RTPS 2.5 §8.7, §9.6.4."""
 
-    __slots__ = ("key_hash", "related", "status")
+    __slots__ = ("key_hash", "related", "status", "verdicts")
 
     def __init__(self, status: int = 0, key_hash: bytes = b"", related: tuple[Guid, int] | None = None) -> None:
         self.status = status
         self.key_hash = key_hash
         self.related = related
+        self.verdicts: dict[bytes, bool] | None = None  # what content filters say, by their signatures
 
     @classmethod
     def read(cls, parameters: object) -> _InlineQos:
@@ -679,10 +682,14 @@ class _InlineQos:
         parameters.require_understood()
         status = parameters.get(ParameterId.STATUS_INFO)
         key_hash = parameters.get(ParameterId.KEY_HASH)
-        return cls(
+        inline = cls(
             status[3] if status is not None and len(status) >= 4 else 0,
             bytes(key_hash[:16]) if key_hash is not None and len(key_hash) >= 16 else b"",
         )
+        filter_info = parameters.get(ParameterId.CONTENT_FILTER_INFO)
+        if filter_info is not None:
+            inline.verdicts = decode_content_filter_info(filter_info, little_endian=parameters.little_endian)
+        return inline
 
 
 _NO_INLINE_QOS = _InlineQos()

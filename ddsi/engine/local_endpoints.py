@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import ClassVar
 
+from ..behavior.content_filter import CompileFilter
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
@@ -69,6 +70,7 @@ class LocalWriter:
     __slots__ = (
         "assertion_due",
         "behavior",
+        "compile_filter",
         "data",
         "deadline",
         "guid",
@@ -104,6 +106,7 @@ class LocalWriter:
         self.assertion_due = float("inf")
         self.has_lost_liveliness = False
         self.wants_acknowledgment = 0  # how many wait for its progress
+        self.compile_filter: CompileFilter | None = None  # without it no reader's content filter is evaluated
 
     def match_changed(self, reader: Guid, change: int) -> Status:
         """One matched reader more (+1) or less (-1)."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..behavior.content_filtering_writer import ContentFilteringWriter
 from ..behavior.defrag import Defragmenter, Keep
 from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.stateless_reader import StatelessReader
@@ -18,6 +19,7 @@ from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
 from ..trace.reasons import LossReason
+from .content_filters import writer_side_filter
 from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
@@ -133,6 +135,7 @@ class Matchmaker:
                 self._tell(writer, data, refusal)
         elif matched:
             if self._still_admits(writer.guid, writer.behavior.readers[data.guid].data, data):
+                self._content_filter_announced(writer, data)
                 writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
             else:
                 self._unmatch_reader(writer, data.guid, LossReason.REJECTED_BY_SECURITY, now)
@@ -186,11 +189,20 @@ class Matchmaker:
     def _match_reader(self, writer: LocalWriter, data: DiscoveredReaderData, now: float) -> None:
         engine = self._engine
         participant = engine.participants[data.guid[:12]]
-        transmissions = writer.behavior.matched_reader_add(data, participant.user_traffic(data.unicast), now)
+        transmissions = writer.behavior.matched_reader_add(
+            data, participant.user_traffic(data.unicast), now, writer_side_filter(writer, data, engine.hooks)
+        )
         engine.receivers_changed(writer)
         self._note_matched(writer.guid, data.guid, data.topic_name)
         engine.status(writer.guid, writer.match_changed(data.guid, 1))
         engine.writer_answers(writer, transmissions)
+
+    def _content_filter_announced(self, writer: LocalWriter, data: DiscoveredReaderData) -> None:
+        """A matched reader says again what it lets pass."""
+        behavior = writer.behavior
+        is_news = behavior.readers[data.guid].data.content_filter != data.content_filter
+        if is_news and isinstance(behavior, ContentFilteringWriter):
+            behavior.content_filter_changed(data.guid, writer_side_filter(writer, data, self._engine.hooks))
 
     def _match_writer(self, reader: LocalReader, data: DiscoveredWriterData, now: float) -> None:
         engine = self._engine

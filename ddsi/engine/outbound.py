@@ -24,6 +24,7 @@ from ..behavior.transmissions import (
 from ..behavior.writer_proxy import WriterProxy
 from ..messages import fast
 from ..messages.acknack import AckNack, NackFrag
+from ..messages.content_filter_info import encode_content_filter_info
 from ..messages.data import Data
 from ..messages.data_frag import DataFrag
 from ..messages.gap import Gap
@@ -154,7 +155,7 @@ class Outbound:
             reader.entity_id if reader is not None else EntityId.UNKNOWN,
             writer.guid.entity_id,
             change.sequence_number,
-            _inline_qos(change),
+            _inline_qos(change, reader),
             payload,
             is_key=change.kind is not ChangeKind.ALIVE,
         )
@@ -182,7 +183,7 @@ class Outbound:
             count,
             size,
             sample_size,
-            _inline_qos(change) if number == 1 else None,
+            _inline_qos(change, reader) if number == 1 else None,
             is_key=change.kind is not ChangeKind.ALIVE,
         ).encode_head(len(payload) + len(padding))
         self._append(writer, reader, (head, payload, padding), change.source_timestamp)
@@ -315,15 +316,20 @@ def _key_payload(payload: Octets) -> Octets:
     return payload if not 0 < len(payload) <= _KEY_HASH_OCTETS else bytes(payload).ljust(_KEY_HASH_OCTETS + 4, b"\0")
 
 
-def _inline_qos(change: CacheChange) -> ParameterList | None:
+def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterList | None:
     """What must travel beside the payload: which end this is, and whose; and what the sample answers.
 
     The key hash goes with every dispose and unregister, and the serialised key too: some stacks need the one
-    (Fast DDS), some the other (Cyclone DDS).  With samples it goes where their key is protected.
+    (Fast DDS), some the other (Cyclone DDS).  With samples it goes where their key is protected.  A reader whose
+    content filter was evaluated here need not do it again.
     """
-    if change.kind is ChangeKind.ALIVE and change.related is None and not change.key_hash:
+    content_filter = reader.content_filter if reader is not None and change.kind is ChangeKind.ALIVE else None
+    if change.kind is ChangeKind.ALIVE and change.related is None and not change.key_hash and content_filter is None:
         return None
     parameters = ParameterList(little_endian=True)
+    if content_filter is not None:
+        verdicts = {content_filter.signature: True}
+        parameters.add(ParameterId.CONTENT_FILTER_INFO, encode_content_filter_info(verdicts))
     if change.key_hash:
         parameters.add(ParameterId.KEY_HASH, change.key_hash)
     if change.kind is not ChangeKind.ALIVE:

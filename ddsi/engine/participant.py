@@ -20,6 +20,8 @@ from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, TypeVar
 
+from ..behavior.content_filter import CompileFilter, ContentFilter, Evaluate
+from ..behavior.content_filtering_writer import ContentFilteringWriter
 from ..behavior.defrag import DefragBudget
 from ..behavior.filtering_writer import FilteringWriter
 from ..behavior.reader_history_cache import ReaderHistoryCache
@@ -46,7 +48,12 @@ from ..spi import (
 from ..spi import Compute as HookCompute
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.dataclass import dataclass
-from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.discovered import (
+    ContentFilterProperty,
+    DiscoveredParticipantData,
+    DiscoveredReaderData,
+    DiscoveredWriterData,
+)
 from ..structure.errors import NotAllowedBySecurity
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
 from ..structure.locator import Locator
@@ -278,6 +285,7 @@ class Participant:
         now: float,
         *,
         is_keyed: bool,
+        compile_filter: CompileFilter | None = None,  # evaluates content filters, to spare readers what they would drop
         filters: bool = False,
         type_information: bytes = b"",
     ) -> LocalWriter:
@@ -291,6 +299,7 @@ class Participant:
         protection = self.hooks.local_writer(data)
         data = replace(data, security_parameters=protection.parameters)
         writer = self.add_writer(data, filters=filters)
+        writer.compile_filter = compile_filter
         writer.protection = protection
         self._writers_by_topic.setdefault(topic_name, {})[writer.guid] = writer
         self.recorder.endpoint_created(data)
@@ -309,11 +318,13 @@ class Participant:
         is_keyed: bool,
         keys: KeyCodec | None = None,
         type_information: bytes = b"",
+        content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
         uses_filter: bool = False,
     ) -> LocalReader:
         """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then.
 
         ``uses_filter``: its writers send each reader its own changes only, so that skipped numbers are no loss.
+        ``content_filter``: what it lets pass, as announced and as evaluated; it implies ``uses_filter``.
         """
         self.now = now
         kind = EntityKind.READER_WITH_KEY if is_keyed else EntityKind.READER_NO_KEY
@@ -321,6 +332,8 @@ class Participant:
             guid=self.new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
             vendor_id=self.config.vendor_id, type_information=type_information,
         )  # fmt: skip
+        if content_filter is not None:
+            data = replace(data, content_filter=content_filter[0])
         protection = self.hooks.local_reader(data)
         data = replace(data, security_parameters=protection.parameters)
         guid = data.guid
@@ -338,12 +351,21 @@ class Participant:
         reader.behavior.history = self.recorder.delivering(guid, history)
         reader.behavior.on_repeat = history.written_again
         reader.protection = protection
-        reader.uses_filter = uses_filter
+        reader.uses_filter = uses_filter or content_filter is not None
+        if content_filter is not None:
+            history.content_filter = ContentFilter(*content_filter)
         self._readers_by_topic.setdefault(topic_name, {})[guid] = reader
         self.recorder.endpoint_created(data)
         self.discovery.announce_reader(reader, now)
         self.matchmaker.reader_appeared(reader, now)
         return reader
+
+    def set_content_filter(self, reader: LocalReader, announced: ContentFilterProperty, evaluate: Evaluate) -> None:
+        """From now on the reader lets something else pass; its writers are told.  What it holds it keeps."""
+        assert reader.history is not None
+        reader.history.content_filter = ContentFilter(announced, evaluate)
+        reader.data = replace(reader.data, content_filter=announced)
+        self.discovery.announce_reader(reader, self.now)
 
     def delete_writer(self, writer: LocalWriter, now: float) -> None:
         """Say that it is gone; but first its readers may, for a second at most, ask for what they miss."""
@@ -693,7 +715,9 @@ class Participant:
 
     def add_writer(self, data: DiscoveredWriterData, *, filters: bool = False) -> LocalWriter:
         """A writer in our tables, announced by nobody and matched with nobody."""
-        behavior = (FilteringWriter if filters else StatefulWriter)(
+        is_builtin = data.guid.entity_id.is_builtin
+        behavior_class = FilteringWriter if filters else StatefulWriter if is_builtin else ContentFilteringWriter
+        behavior = behavior_class(
             data.guid,
             data.qos,
             fragment_octets=fragment_octets_for(

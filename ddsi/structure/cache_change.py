@@ -52,6 +52,7 @@ class CacheChange:
         "sealed",
         "sequence_number",
         "source_timestamp",
+        "verdicts",
         "writer_guid",
     )
 
@@ -81,6 +82,8 @@ class CacheChange:
         self.expiry = expiry
         self.fragment_octets = 0
         self.sealed: bytes | bytearray | memoryview | None = None
+        # What content filters say of it, by their signatures: found out here, or told by its writer.
+        self.verdicts: dict[bytes, bool] | None = None
 
     def __repr__(self) -> str:
         return f"<CacheChange {self.kind.name} {self.writer_guid}#{self.sequence_number}, {len(self.payload)} octets>"

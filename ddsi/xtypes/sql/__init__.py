@@ -9,6 +9,7 @@ from .field_path import FieldPath
 from .filter_expression import FilterExpression
 from .parser import parse_filter, parse_query, parse_topic_expression
 from .query_expression import QueryExpression
+from .sample_filters import SampleFilters
 from .syntax import InvalidExpression, TopicExpression
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "FilterExpression",
     "InvalidExpression",
     "QueryExpression",
+    "SampleFilters",
     "TopicExpression",
     "parse_filter",
     "parse_query",
