@@ -26,8 +26,8 @@ from ..structure.sample_info import (
     SampleState,
     ViewState,
 )
-from .content_filter import ContentFilter
 from .instance import Instance
+from .instance_order import InstanceOrder
 from .sample_gate import SampleGate
 
 __all__ = ["Instance", "ReaderHistoryCache", "SampleSelector"]
@@ -81,10 +81,10 @@ class ReaderHistoryCache:
         self._on_rejected = on_rejected
         self._has_news = False
         self.is_withholding = False  # did a reliable writer's sample find no room?
-        self.content_filter: ContentFilter | None = None  # what does not pass has been received, and is not kept
         self._withheld: dict[bytes, int] = {}  # by writer: the number that found none last
         self._by_source = isinstance(qos.destination_order, BySourceTimestamp)
         self._instances: dict[bytes, Instance] = {}
+        self._handles: InstanceOrder | None = None  # from when somebody asks for the next instance
         # In order of arrival.  What was taken from the middle or pushed out stays until it comes to the front
         # or the queue is compacted; such a sample has no change any more.
         self._order: deque[SampleInfo] = deque()
@@ -113,8 +113,6 @@ class ReaderHistoryCache:
 
     def add(self, change: CacheChange, now: float) -> bool:
         """Take one change; False when a reliable writer's has to wait until the application has taken something."""
-        if self.content_filter is not None and not self.content_filter.passes(change):
-            return True
         instance = self._instances.get(change.key)
         if instance is None:
             if change.kind is not ChangeKind.ALIVE:
@@ -137,7 +135,10 @@ class ReaderHistoryCache:
             limit = self._limit_reached(instance, len(change.payload))
             if limit is not None:
                 return self._no_room(limit, change)
-            self._instances[change.key] = instance
+            if change.key not in self._instances:
+                self._instances[change.key] = instance
+                if self._handles is not None:
+                    self._handles.add(change.key)
         if instance.state is not _ALIVE:
             self._revive(instance)
         if change.writer_guid not in instance.writers:
@@ -389,6 +390,7 @@ class ReaderHistoryCache:
             info.view_state = instance.view_state
             instance.view_state = _NOT_NEW
             info.instance_state = instance.state
+            info.sample_rank = 0  # it may have been read among others before
             if instance.generation:
                 self._set_generation_ranks([(info, instance)])
             self._purge(instance)
@@ -435,6 +437,23 @@ class ReaderHistoryCache:
         for info, _ in chosen:
             info.sample_state = _READ
         return [(info, change) for info, change in result if change is not None]
+
+    def next_instance(
+        self,
+        previous: bytes | None,
+        *,
+        sample_states: int,
+        view_states: int,
+        instance_states: int,
+        selector: SampleSelector | None = None,
+    ) -> bytes | None:
+        """The first instance behind ``previous`` (None: of all) that has any such sample.  DDS 1.4 §2.2.2.5.3.14."""
+        if self._handles is None:
+            self._handles = InstanceOrder(self._instances, self._instances)
+        for key in self._handles.after(previous):
+            if self._select(1, sample_states, view_states, instance_states, key, selector, touch=False):
+                return key
+        return None
 
     def matches(
         self, *, sample_states: int, view_states: int, instance_states: int, selector: SampleSelector | None = None

@@ -107,6 +107,50 @@ class SampleReader(Entity, Generic[T]):
         self._drop_undecodable()
         return samples
 
+    def take_next_instance(
+        self,
+        previous: bytes | None,
+        max_samples: int | None = None,
+        *,
+        condition: ReadCondition | None = None,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+    ) -> list[Sample[T]]:
+        """As :meth:`take`, of the first instance behind the handle ``previous`` that has such samples.
+
+        None begins with the first of all, and the last one is followed by nothing.  ``previous`` need not be known any
+        more: handles have an order of their own.  DDS 1.4 §2.2.2.5.3.15.
+        """
+        states = (sample_states, view_states, instance_states)
+        handle = self._next_instance(previous, condition, *states)
+        if handle is None:
+            return []
+        return self.take(
+            max_samples, condition=condition, sample_states=sample_states, view_states=view_states,
+            instance_states=instance_states, instance=handle,
+        )  # fmt: skip
+
+    def read_next_instance(
+        self,
+        previous: bytes | None,
+        max_samples: int | None = None,
+        *,
+        condition: ReadCondition | None = None,
+        sample_states: int = ANY_SAMPLE_STATE,
+        view_states: int = ANY_VIEW_STATE,
+        instance_states: int = ANY_INSTANCE_STATE,
+    ) -> list[Sample[T]]:
+        """As :meth:`take_next_instance`, but the samples stay and count as read.  DDS 1.4 §2.2.2.5.3.14."""
+        states = (sample_states, view_states, instance_states)
+        handle = self._next_instance(previous, condition, *states)
+        if handle is None:
+            return []
+        return self.read(
+            max_samples, condition=condition, sample_states=sample_states, view_states=view_states,
+            instance_states=instance_states, instance=handle,
+        )  # fmt: skip
+
     async def wait(self, condition: ReadCondition | None = None) -> None:
         """Until there is a sample that fits ``condition`` (none given: one that has not been read).
 
@@ -122,6 +166,13 @@ class SampleReader(Entity, Generic[T]):
         self._drop_undecodable()
 
     # --- inside ------------------------------------------------------------------------------------------
+
+    def _next_instance(
+        self, previous: bytes | None, condition: ReadCondition | None, samples: int, views: int, instances: int
+    ) -> bytes | None:
+        self._check_open()
+        states, selector = self._selection(condition, samples, views, instances)
+        return self._history.next_instance(previous, selector=selector, **states)
 
     def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
         """The sample as an object; None if its octets are not one."""

@@ -326,3 +326,34 @@ async def test_the_loss_of_an_undecodable_sample_is_an_event(domain: int) -> Non
             if isinstance(event, ddsi.SampleLost):
                 assert event.total_count_change == 1
                 break
+
+
+# --- one instance after the other ----------------------------------------------------------------------------------
+
+
+@in_trio
+async def test_instances_are_gone_through_by_their_handles(domain: int) -> None:
+    async with pair(domain, local=True) as p:
+        for color in ("RED", "BLUE", "RED", "GREEN"):
+            await p.writer.write(Shape(color, 1))
+        found: list[list[str]] = []
+        handle: bytes | None = None
+        while samples := p.reader.read_next_instance(handle):
+            handle = samples[0].info.instance_handle
+            found.append([sample.data.color for sample in samples])
+        assert sorted(found) == [["BLUE"], ["GREEN"], ["RED", "RED"]]
+        taken = p.reader.take_next_instance(None, 1)
+        assert [sample.data.color for sample in taken] == found[0][:1]
+        assert p.reader.take_next_instance(None, sample_states=ddsi.SampleState.NOT_READ) == []
+
+
+@in_trio
+async def test_the_next_instance_follows_one_that_is_gone(domain: int) -> None:
+    async with pair(domain, local=True) as p:
+        for color in ("RED", "BLUE"):
+            await p.writer.write(Shape(color, 1))
+            await p.writer.unregister(Shape(color))
+        (first, _) = p.reader.take_next_instance(None)
+        (second, _) = p.reader.take_next_instance(first.info.instance_handle)
+        assert {first.data.color, second.data.color} == {"RED", "BLUE"}
+        assert p.reader.take_next_instance(second.info.instance_handle) == []
