@@ -12,6 +12,7 @@ Here are structs, unions and their members; ``read_values.py`` has the rest.
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Callable
 from typing import Any
 
@@ -40,6 +41,7 @@ def generate_reader(
     """
     source = Source(f"read {struct_type.type_name}, {encoding.name}{', memoryview' if view else ''}")
     source.names |= {
+        "array": array,
         "new": object.__new__,
         "number_array": buffers.number_array,
         "booleans_from": buffers.booleans_from,

@@ -218,8 +218,9 @@ class ValueReader:
         if element.is_octet:
             return piece
         if element.is_number:
-            swap = needs_swap(little_endian=self._encoding.little_endian)
-            return f"number_array('{element.code}', {piece}, 0, {octets}, swap={swap})"
+            if needs_swap(little_endian=self._encoding.little_endian):
+                return f"number_array('{element.code}', {piece}, 0, {octets}, swap=True)"
+            return f"array('{element.code}', {piece})"
         return self._characters(element, piece)
 
     def _sequence(self, type_: SequenceType) -> str:

@@ -10,7 +10,6 @@ Here are structs, unions and their members; ``write_values.py`` has the rest.
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +19,7 @@ from .model import Composite, Extensibility, Member, StructType, UnionType
 from .recursion import FunctionPlan
 from .source import Source
 from .write_emitter import Position, WriteEmitter
-from .write_values import ValueWriter, enum_values, pack_numbers
+from .write_values import PLAIN_SEQUENCES, ValueWriter, enum_values, pack_numbers
 
 __all__ = ["generate_writer"]
 
@@ -40,7 +39,7 @@ def generate_writer(
     """
     source = Source(f"write {struct_type.type_name}, {encoding.name}")
     source.names |= {name: getattr(buffers, name) for name in _RUNTIME} | {
-        "array": array,
+        "PLAIN_SEQUENCES": PLAIN_SEQUENCES,
         "enum_values": enum_values,
         "pack_numbers": pack_numbers,
     }

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 import struct
+from array import array
 from typing import Any
 
 from .buffers import needs_swap
@@ -32,10 +33,14 @@ from .source import Source
 from .stride import Stride, stride
 from .write_emitter import Position, WriteEmitter
 
-__all__ = ["ValueWriter", "enum_values", "pack_numbers"]
+__all__ = ["PLAIN_SEQUENCES", "ValueWriter", "enum_values", "pack_numbers"]
 
 _IN_RUN = 64
 """Arrays of primitives up to so many octets are copied into a run; larger ones go as buffers of their own."""
+
+
+PLAIN_SEQUENCES = frozenset({list, tuple, array})
+"""Their elements go to :mod:`struct` one by one, which checks each."""
 
 
 def enum_values(values: Any, python_class: type[enum.IntEnum]) -> list[int]:
@@ -190,9 +195,16 @@ class ValueWriter:
         if element.is_octet:
             buffer = f"array_octets({expression}, {dimensions})"
         elif element.is_number:
+            expression = self._local("x", expression)
             swap = needs_swap(little_endian=self._encoding.little_endian)
             layout = f"'{element.code}', {element.size}, '{self._encoding.order}', swap={swap}"
             buffer = f"array_numbers({expression}, {dimensions}, {layout})"
+            if len(dimensions) == 1 and not type_.numpy:
+                if octets <= _IN_RUN:
+                    self._numbers_in_run(type_, element, expression, buffer)
+                    return
+                pack = self._source.packer(f"{self._encoding.order}{type_.count}{element.code}")
+                buffer = f"{pack}(*{expression}) if {expression}.__class__ is list else {buffer}"
         else:
             buffer = self._characters(element, f"flatten({expression}, {dimensions})")
         emitter.align(self._encoding.alignment(element.size))
@@ -204,6 +216,16 @@ class ValueWriter:
             emitter.part(name, str(octets), emitter.position.residue.advance(octets))
         if not element.is_number:
             self._refuse(f"len({name}) != {octets}")
+
+    def _numbers_in_run(self, type_: ArrayType, element: Primitive, value: str, buffer: str) -> None:
+        """A few numbers are items as any others; ``buffer`` makes octets of what is no plain sequence of them."""
+        codes = f"{type_.count}{element.code}"
+        unpack = self._source.define("unpack_", f'Struct("{self._encoding.order}{codes}").unpack')
+        with self._source.block(f"if {value}.__class__ not in PLAIN_SEQUENCES:"):
+            self._source.line(f"{value} = {unpack}({buffer})")
+        self._refuse(f"len({value}) != {type_.count}")
+        self._emitter.align(self._encoding.alignment(element.size))
+        self._emitter.item(codes, type_.count * element.size, f"*{value}")
 
     def _sequence(self, type_: SequenceType, expression: str) -> None:
         emitter = self._emitter

@@ -1,0 +1,94 @@
+"""Arrays of numbers, in line and as buffers: whatever holds the numbers, the octets are the same."""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections import UserList
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+
+from ddsi.structure.errors import BadParameter
+from ddsi.structure.qos_policies import DataRepresentationId
+from ddsi.xtypes import deserialize, idl, serialize
+
+XCDR1 = DataRepresentationId.XCDR1
+
+
+@idl.struct(extensibility=idl.FINAL)
+class Small:
+    head: idl.int8
+    values: Annotated[idl.sequence[idl.float64], idl.array(3)]
+    counts: Annotated[idl.sequence[idl.uint16], idl.array(3)]
+
+
+@idl.struct(extensibility=idl.FINAL)
+class Large:
+    head: idl.int8
+    values: Annotated[idl.sequence[idl.float64], idl.array(30)]
+    counts: Annotated[idl.sequence[idl.uint16], idl.array(40)]
+
+
+FORMS: list[Any] = [
+    list,
+    tuple,
+    UserList,
+    lambda numbers: array("d", numbers),
+    lambda numbers: array("H", numbers),
+    lambda numbers: array("b", numbers),
+    lambda numbers: memoryview(array("q", numbers)),
+    lambda numbers: np.array(numbers, dtype="<u2"),
+    lambda numbers: np.array(numbers, dtype=">f8"),
+]
+
+
+@pytest.mark.parametrize("class_", [Small, Large])
+@pytest.mark.parametrize("byteorder", ["little", "big"])
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_of_the_numbers_gives_the_same_octets(class_: Any, byteorder: Any, form: Any) -> None:
+    values, counts = ([0, 1, 2], [7, 8, 9]) if class_ is Small else (list(range(30)), list(range(40)))
+    order = "<" if byteorder == "little" else ">"
+    body = struct.pack(f"{order}b7x{len(values)}d{len(counts)}H", 1, *values, *counts)
+    expected = bytes((0, byteorder == "little", 0, 0)) + body
+    assert serialize(class_(1, form(values), tuple(counts)), byteorder=byteorder, representation=XCDR1) == expected
+    again = deserialize(class_, expected)
+    assert (again.values, again.counts) == (array("d", values), array("H", counts))
+
+
+@pytest.mark.parametrize("class_", [Small, Large])
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ([1.0, 2.0], "values: 2 elements where the array has"),
+        ((1.0,) * 41, "values: 41 elements where the array has"),
+        (array("d", [1.0] * 4), "values: 4 elements where the array has"),
+        (np.zeros(5), "values: 5 elements where the array has"),
+        ({1: 1, 2: 2, 3: 3}, "values: {1: 1, 2: 2, 3: 3} is no sequence of float64"),
+        ({1.0, 2.0, 3.0}, "is no sequence of float64"),
+        ("123", "values: '123' is a string"),
+        (None, "values: None is no sequence of float64"),
+    ],
+)
+def test_what_is_no_such_array_is_named(class_: Any, values: Any, reason: str) -> None:
+    counts = [1] * (3 if class_ is Small else 40)
+    with pytest.raises(BadParameter, match=reason.replace("{", r"\{")):
+        serialize(class_(1, values, counts))
+
+
+@pytest.mark.parametrize(("class_", "length"), [(Small, 3), (Large, 40)])
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        (65536, r"counts\[1\]: 65536 does not fit uint16"),
+        (-1, r"counts\[1\]: -1 does not fit uint16"),
+        (1.5, r"counts\[1\]: 1.5 is no integer"),
+        ("1", r"counts\[1\]: '1' is no integer"),
+    ],
+)
+@pytest.mark.parametrize("form", [list, tuple, UserList])
+def test_an_element_that_does_not_fit_is_named(class_: Any, length: int, wrong: Any, reason: str, form: Any) -> None:
+    values = [0.0] * (3 if class_ is Small else 30)
+    with pytest.raises(BadParameter, match=reason):
+        serialize(class_(1, values, form([0, wrong, *[0] * (length - 2)])))
