@@ -42,7 +42,7 @@ def _ascii(name: str) -> str:
 
 def _free(name: str, otherwise: str, taken: Container[str]) -> str:
     """``otherwise`` is what no other has, so that few tries are enough."""
-    candidate = name if name not in taken else f"{name}_{otherwise}"
+    candidate = name if name not in taken else f"{name.rstrip('_')}_{otherwise}"
     while candidate in taken:
         candidate += "_"
     return candidate
