@@ -55,6 +55,9 @@ __all__ = ["make_class"]
 MODULE = "ddsi_dynamic"
 """The ``__module__`` of the classes.  There is none of this name: they can be neither imported nor pickled."""
 
+_INT_ENUM: Any = enum.IntEnum  # called with literals, these make classes, which no checker knows how to say
+_INT_FLAG: Any = enum.IntFlag
+
 _PRIMITIVES: dict[int, Any] = {
     TypeKind.BOOLEAN: idl.boolean,
     TypeKind.BYTE: idl.octet,
@@ -263,7 +266,7 @@ class _Classes:
             if MemberFlag.DEFAULT in literal.flags and default is None:
                 default = name
         type_name = self._type_name_of(identifier, described.type_name)
-        python_class = enum.IntEnum(class_name(type_name, "Enum"), values, module=MODULE)  # type: ignore[misc]
+        python_class: type[enum.IntEnum] = _INT_ENUM(class_name(type_name, "Enum"), values, module=MODULE)
         describe_enum(python_class, type_name=type_name, bit_bound=described.bit_bound, default=default)
         return python_class
 
@@ -277,7 +280,7 @@ class _Classes:
                 raise BadParameter(f"two flags are at bit {flag.position}")
             values[name] = 1 << flag.position
         type_name = self._type_name_of(identifier, described.type_name)
-        python_class = enum.IntFlag(class_name(type_name, "Bitmask"), values, module=MODULE)  # type: ignore[misc]
+        python_class: type[enum.IntFlag] = _INT_FLAG(class_name(type_name, "Bitmask"), values, module=MODULE)
         describe_bitmask(python_class, type_name=type_name, bit_bound=described.bit_bound)
         return python_class
 
