@@ -266,6 +266,10 @@ def after(type_: IdlType, start: Residue, encoding: Encoding) -> Residue:
             return start.align(4).advance_multiple(4)
         case StructType(extensibility=Extensibility.MUTABLE) if not encoding.is_xcdr2:
             return Residue(4, 0)  # the end of a parameter list is a parameter
+        case StructType(members=(*_, last)) if (
+            not last.is_optional and type_.extensibility is not Extensibility.MUTABLE
+        ):
+            return after(last.type, UNKNOWN, encoding)  # the rest of it may be worth nothing
         case _:
             return UNKNOWN
 

@@ -168,9 +168,9 @@ class _TypeReader(ValueReader):
         emitter.then(f"{index} = {selection}.get({discriminator}, {type_.default_index})")
         with emitter.branches() as alternatives:
             for number, case in enumerate(type_.cases):
-                with alternatives.branch(f"if {index} == {number}:"):
+                with alternatives.branch(f"{'elif' if number else 'if'} {index} == {number}:"):
                     self._assign(value, self._parameter(case) if mutable else self.value(case.type))
-            with alternatives.branch(f"if {index} < 0:"):
+            with alternatives.branch("else:" if type_.cases else f"if {index} < 0:"):
                 self._assign(value, "None")
         if mutable:
             self._end_parameters()

@@ -19,7 +19,7 @@ from .model import Composite, Extensibility, Member, StructType, UnionType
 from .recursion import FunctionPlan
 from .source import Source
 from .write_emitter import Position, WriteEmitter
-from .write_values import PLAIN_SEQUENCES, ValueWriter, enum_values, pack_numbers
+from .write_values import PLAIN_SEQUENCES, ValueWriter, enum_values, pack_numbers, pack_strings
 
 __all__ = ["generate_writer"]
 
@@ -42,6 +42,7 @@ def generate_writer(
         "PLAIN_SEQUENCES": PLAIN_SEQUENCES,
         "enum_values": enum_values,
         "pack_numbers": pack_numbers,
+        "pack_strings": pack_strings,
     }
     writer = _TypeWriter(source, encoding, FunctionPlan(struct_type))
     with source.block("def write(v):"):
@@ -159,9 +160,9 @@ class _TypeWriter(ValueWriter):
         )
         with self._emitter.branches() as alternatives:
             for number, case in enumerate(type_.cases):
-                with alternatives.branch(f"if {index} == {number}:"):
+                with alternatives.branch(f"{'elif' if number else 'if'} {index} == {number}:"):
                     write_member(case, f"{value}._idl_value")
-            with alternatives.branch(f"if {index} < 0:"):
+            with alternatives.branch("else:" if type_.cases else f"if {index} < 0:"):
                 pass
         if mutable:
             self._end_parameters()

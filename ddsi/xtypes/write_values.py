@@ -8,6 +8,7 @@ from __future__ import annotations
 import enum
 import struct
 from array import array
+from collections.abc import Callable
 from typing import Any
 
 from .buffers import needs_swap
@@ -33,7 +34,7 @@ from .source import Source
 from .stride import Stride, stride
 from .write_emitter import Position, WriteEmitter
 
-__all__ = ["PLAIN_SEQUENCES", "ValueWriter", "enum_values", "pack_numbers"]
+__all__ = ["PLAIN_SEQUENCES", "ValueWriter", "enum_values", "pack_numbers", "pack_strings"]
 
 _IN_RUN = 64
 """Arrays of primitives up to so many octets are copied into a run; larger ones go as buffers of their own."""
@@ -50,6 +51,24 @@ def enum_values(values: Any, python_class: type[enum.IntEnum]) -> list[int]:
 
 def pack_numbers(order: str, code: str, values: list[int]) -> bytes:
     return struct.pack(f"{order}{len(values)}{code}", *values)
+
+
+def pack_strings(pack_length: Callable[[int], bytes], values: Any, bound: int | None) -> bytes:
+    """Strings one behind the other, each with its length and NUL, and aligned to 4 as the first of them is.
+
+    Raises TypeError or ValueError for what is no string, too long, or holds a NUL.
+    """
+    encoded = list(map(str.encode, values))
+    if 0 in b"".join(encoded) or (bound is not None and any(len(string) > bound for string in encoded)):
+        raise ValueError
+    pieces = [pack_length(len(string) + 1) + string + _STRING_ENDS[len(string) & 3] for string in encoded]
+    if pieces:  # no padding behind the last one
+        pieces[-1] = pieces[-1][: 5 + len(encoded[-1])]
+    return b"".join(pieces)
+
+
+_STRING_ENDS = tuple(bytes(4 - length) for length in range(4))
+"""The NUL behind a string, and padding up to the next one, by the string's length modulo 4."""
 
 
 class ValueWriter:
@@ -280,6 +299,12 @@ class ValueWriter:
             residue = emitter.position.residue.advance_multiple(element.size)
             octets = f"{count} * {element.size}"
             emitter.part(f"pack_numbers('{encoding.order}', '{element.code}', {value})", octets, residue)
+            return
+        if isinstance(element, String) and not element.wide:
+            emitter.align(4)
+            pack_length = self._source.packer(f"{encoding.order}I")
+            name = self._local("b", f"pack_strings({pack_length}, {value}, {element.bound})")
+            emitter.part(name, f"len({name})", UNKNOWN)
             return
         step = stride(element, emitter.position.residue, encoding)
         if step is not None:

@@ -1,4 +1,4 @@
-"""Arrays of numbers, in line and as buffers: whatever holds the numbers, the octets are the same."""
+"""Arrays of numbers, whatever holds the numbers, and sequences of strings: the quick ways give the same octets."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ import pytest
 from ddsi.structure.errors import BadParameter
 from ddsi.structure.qos_policies import DataRepresentationId
 from ddsi.xtypes import deserialize, idl, serialize
+from ddsi.xtypes.careful_reader import read_carefully
+from ddsi.xtypes.definition import struct_type
 
-XCDR1 = DataRepresentationId.XCDR1
+XCDR1, XCDR2 = DataRepresentationId.XCDR1, DataRepresentationId.XCDR2
 
 
 @idl.struct(extensibility=idl.FINAL)
@@ -92,3 +94,39 @@ def test_an_element_that_does_not_fit_is_named(class_: Any, length: int, wrong: 
     values = [0.0] * (3 if class_ is Small else 30)
     with pytest.raises(BadParameter, match=reason):
         serialize(class_(1, values, form([0, wrong, *[0] * (length - 2)])))
+
+
+@idl.struct(extensibility=idl.FINAL)
+class Names:
+    head: idl.int8
+    names: Annotated[idl.sequence[Annotated[str, idl.bound(5)]], idl.bound(4)]
+    pair: Annotated[idl.sequence[str], idl.array(2)]
+    tail: idl.int8
+
+
+@pytest.mark.parametrize("representation", [XCDR1, XCDR2])
+@pytest.mark.parametrize("names", [[], [""], ["a", "bc"], ("abcde", "", "\u20ac", "abcd"), ["abc", "xyz"]])
+def test_strings_lie_as_the_careful_reader_expects(names: Any, representation: DataRepresentationId) -> None:
+    for pair in (["", ""], ["abc", "d"], ["defgh", "abc"]):
+        sample = Names(1, names, pair, -1)
+        octets = serialize(sample, representation=representation)
+        assert read_carefully(struct_type(Names), octets) == Names(1, list(names), pair, -1)
+        assert deserialize(Names, octets) == Names(1, list(names), pair, -1)
+
+
+@pytest.mark.parametrize(
+    ("names", "reason"),
+    [
+        (["a", "abcdef"], r"names\[1\]: a string of 6 octets exceeds its bound of 5"),
+        (["a", "b\0"], r"names\[1\]: 'b\\x00' contains a NUL"),
+        (["a", None], r"names\[1\]: None is no string"),
+        (["a", b"b"], r"names\[1\]: b'b' is no string"),
+        ("ab", "names: 'ab' is a string, not a sequence"),
+        ({"a": 1}, "is no sequence of string"),
+        (["a"] * 5, "names: 5 elements exceed the bound of 4"),
+        (["\ud800"], "has no UTF-8 form"),
+    ],
+)
+def test_a_string_that_does_not_fit_is_named(names: Any, reason: str) -> None:
+    with pytest.raises(BadParameter, match=reason):
+        serialize(Names(1, names, ["", ""], 1))
