@@ -25,6 +25,7 @@ from .config import Config
 from .config.secure import secure
 from .dcps import (
     BuiltinTopicReader,
+    ContentFilteredTopic,
     DataReader,
     DataWriter,
     DomainParticipant,
@@ -138,6 +139,7 @@ __all__ = [
     "BySourceTimestamp",
     "Config",
     "ConfigurationError",
+    "ContentFilteredTopic",
     "DataReader",
     "DataRepresentation",
     "DataRepresentationId",

@@ -2,6 +2,7 @@
 
 from .builtin_topic_reader import BuiltinTopicReader
 from .conditions import ReadCondition
+from .content_filtered_topic import ContentFilteredTopic
 from .data_reader import DataReader
 from .data_writer import DataWriter
 from .entity import Entity, EventStream
@@ -12,6 +13,7 @@ from .topic import Topic
 
 __all__ = [
     "BuiltinTopicReader",
+    "ContentFilteredTopic",
     "DataReader",
     "DataWriter",
     "DomainParticipant",

@@ -26,6 +26,7 @@ from ..structure.status import (
     Status,
 )
 from ..structure.time import Time
+from .content_filtered_topic import filter_compiler
 from .endpoint import Endpoint, QosPlan
 from .entity import deadline_scope
 from .groups import Publisher, check_family
@@ -83,6 +84,7 @@ class DataWriter(Endpoint, Generic[T]):
             resolved,
             self._pump.now(),
             is_keyed=support.is_keyed,
+            compile_filter=filter_compiler(support),
             type_information=support.type_information if self._pump.engine.config.announce_types else b"",
         )
         self._hides_keys = support.is_keyed and self._writer.protection.key_protected

@@ -360,12 +360,15 @@ class Participant:
         self.matchmaker.reader_appeared(reader, now)
         return reader
 
-    def set_content_filter(self, reader: LocalReader, announced: ContentFilterProperty, evaluate: Evaluate) -> None:
+    def set_content_filter(
+        self, reader: LocalReader, announced: ContentFilterProperty, evaluate: Evaluate, now: float
+    ) -> None:
         """From now on the reader lets something else pass; its writers are told.  What it holds it keeps."""
+        self.now = now
         assert reader.history is not None
         reader.history.content_filter = ContentFilter(announced, evaluate)
         reader.data = replace(reader.data, content_filter=announced)
-        self.discovery.announce_reader(reader, self.now)
+        self.discovery.announce_reader(reader, now)
 
     def delete_writer(self, writer: LocalWriter, now: float) -> None:
         """Say that it is gone; but first its readers may, for a second at most, ask for what they miss."""
