@@ -25,7 +25,6 @@ from .config import Config
 from .config.secure import secure
 from .dcps import (
     BuiltinTopicReader,
-    ContentFilteredTopic,
     DataReader,
     DataWriter,
     DomainParticipant,
@@ -100,6 +99,8 @@ from .structure.qos_policies import (
 from .structure.sample_info import InstanceState, SampleInfo, SampleState, ViewState
 from .structure.security_information import EndpointSecurity, ParticipantSecurity
 from .structure.status import (
+    DataAvailable,
+    DataOnReaders,
     Incompatibility,
     InconsistentTopic,
     LivelinessChanged,
@@ -139,7 +140,8 @@ __all__ = [
     "BySourceTimestamp",
     "Config",
     "ConfigurationError",
-    "ContentFilteredTopic",
+    "DataAvailable",
+    "DataOnReaders",
     "DataReader",
     "DataRepresentation",
     "DataRepresentationId",

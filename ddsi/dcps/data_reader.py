@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import trio
 
-from ..behavior.content_filter import Evaluate
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..engine import KeyCodec, LocalReader, publication_data
 from ..structure.builtin_topic_data import PublicationBuiltinTopicData
 from ..structure.cache_change import CacheChange
-from ..structure.discovered import ContentFilterProperty
 from ..structure.errors import BadParameter, DdsTimeout, MalformedSample
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, reader_qos
 from ..structure.qos_policies import DataRepresentation, DataRepresentationId
 from ..structure.sample_info import SampleInfo
 from ..structure.status import (
+    DataAvailable,
     InconsistentTopic,
     LivelinessChanged,
     RequestedDeadlineMissed,
@@ -29,7 +28,6 @@ from ..structure.status import (
     Status,
     SubscriptionMatched,
 )
-from .content_filtered_topic import ContentFilteredTopic
 from .endpoint import Endpoint, QosPlan
 from .entity import deadline_scope
 from .groups import Subscriber, check_family
@@ -51,6 +49,7 @@ class DataReader(SampleReader[T], Endpoint):
     """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``, which never wait."""
 
     STATUSES: ClassVar[tuple[type, ...]] = (
+        DataAvailable,
         SubscriptionMatched,
         RequestedIncompatibleQos,
         LivelinessChanged,
@@ -61,21 +60,11 @@ class DataReader(SampleReader[T], Endpoint):
         SecurityRefused,
     )
 
-    def __init__(
-        self,
-        parent: DomainParticipant | Subscriber,
-        topic: Topic[T] | ContentFilteredTopic[T],
-        qos: Qos | None = None,
-    ) -> None:
+    def __init__(self, parent: DomainParticipant | Subscriber, topic: Topic[T], qos: Qos | None = None) -> None:
         """``qos`` goes before the subscriber's, and that before the topic's; the rest is the OMG's default.
 
-        Of a ContentFilteredTopic it gets only what passes; its own topic is the related one then.  Raises
-        InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
+        Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """
-        filtered: ContentFilteredTopic[T] | None = None
-        if isinstance(topic, ContentFilteredTopic):
-            topic._check_open()
-            filtered, topic = topic, topic.related_topic
         participant = check_family(parent, topic, Subscriber)
         super().__init__(participant, qos)
         self._parent = parent
@@ -93,15 +82,11 @@ class DataReader(SampleReader[T], Endpoint):
             self._pump.now(),
             is_keyed=support.is_keyed,
             keys=_key_codec(topic) if support.is_keyed else None,
-            content_filter=(filtered._announced, filtered._evaluate) if filtered is not None else None,
             type_information=support.type_information if self._pump.engine.config.announce_types else b"",
         )
         history = self._reader.history
         assert history is not None
         self._history: ReaderHistoryCache = history
-        self._filtered = filtered
-        if filtered is not None:
-            filtered._readers.add(self)
         parent._adopt(self)
         participant._register(self._reader.guid, self)
         self._pump.settle()
@@ -112,11 +97,6 @@ class DataReader(SampleReader[T], Endpoint):
     @property
     def topic(self) -> Topic[T]:
         return self._topic
-
-    @property
-    def content_filtered_topic(self) -> ContentFilteredTopic[T] | None:
-        """What it was made of, if that was not the topic itself."""
-        return self._filtered
 
     @property
     def guid(self) -> Guid:
@@ -183,11 +163,6 @@ class DataReader(SampleReader[T], Endpoint):
         super()._follow(plan)
         self._pump.settle()
 
-    def _set_content_filter(self, announced: ContentFilterProperty, evaluate: Evaluate) -> None:
-        """Its content-filtered topic has other parameters."""
-        self._pump.engine.set_content_filter(self._reader, announced, evaluate, self._pump.now())
-        self._pump.settle()
-
     def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
         """The sample as an object; None, and counted as lost, if its octets are not one."""
         try:
@@ -219,6 +194,10 @@ class DataReader(SampleReader[T], Endpoint):
             self._history.is_withholding = False
             self._pump.engine.samples_taken(self._reader, self._pump.now())
             self._pump.settle()
+
+    def _has_news(self) -> None:
+        super()._has_news()
+        self._parent._has_news()
 
     def _status_changed(self, status: Status) -> None:
         if isinstance(status, InconsistentTopic):

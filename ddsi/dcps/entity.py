@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import AsyncIterator
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from weakref import WeakSet
 
 import trio
 
 from ..structure.errors import AlreadyDeleted, BadParameter, ImmutablePolicy, NotAllowedBySecurity
 from ..structure.qos import Qos
-from ..structure.status import Status
+from ..structure.status import DataAvailable, DataOnReaders, Status
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
@@ -39,6 +40,8 @@ class EventStream(AsyncIterator[Status]):
         self.dropped = 0
 
     def put(self, event: Status) -> None:
+        if isinstance(event, (DataAvailable, DataOnReaders)) and self._events and self._events[-1] == event:
+            return  # the same news
         if len(self._events) >= _MAX_EVENTS:
             self._events.popleft()
             self.dropped += 1
@@ -79,6 +82,7 @@ class Entity:
         self._revocation: str | None = None  # why security closed it, if it did
         self._changed = trio.lowlevel.ParkingLot()
         self._statuses: dict[type, Status] = {}
+        self._status_changes: set[type] = set()
         # Weakly: a stream lives as long as somebody reads it, and ends with the loop that did.
         self._streams: WeakSet[EventStream] = WeakSet()
         # What happened before anybody listened (a match within the participant happens at once).
@@ -123,13 +127,27 @@ class Entity:
     def status(self, kind: type[_S]) -> _S:
         """The present value of one status, for instance ``writer.status(PublicationMatched).current_count``.
 
-        Raises BadParameter where an entity of this kind has no such status.
+        Its ``..._change`` fields tell what changed since it was read last, by this method, and are 0 from now on
+        (events are another matter: each tells its own change).  Raises BadParameter where an entity of this kind has
+        no such status.  DDS 1.4 §2.2.4.1.
         """
         if not any(kind is known for known in self.STATUSES):
             names = ", ".join(known.__name__ for known in self.STATUSES) or "none"
             raise BadParameter(f"a {type(self).__name__} has the statuses {names}, but no {kind!r}")
         value = self._statuses.get(kind)
-        return value if isinstance(value, kind) else kind()
+        if not isinstance(value, kind):
+            return kind()
+        if kind in self._status_changes:
+            self._status_changes.discard(kind)
+            self._statuses[kind] = _unchanged(value)
+        return value
+
+    def status_changes(self) -> frozenset[type]:
+        """The kinds of status that have changed since they were read by :meth:`status`.
+
+        DDS 1.4 §2.2.2.1.1.6 (get_status_changes).
+        """
+        return frozenset(self._status_changes)
 
     def close(self) -> None:
         """End the entity; what it held is released at once, and peers are told."""
@@ -151,8 +169,11 @@ class Entity:
         """A writer: something was acknowledged."""
 
     def _status_changed(self, status: Status) -> None:
+        kind = type(status)
+        before = self._statuses.get(kind)
+        self._statuses[kind] = _accumulated(before, status) if kind in self._status_changes and before else status
+        self._status_changes.add(kind)
         self._changed.unpark_all()
-        self._statuses[type(status)] = status
         if not self._streams:
             self._early_events.append(status)
         for stream in self._streams:
@@ -203,6 +224,20 @@ class Parent(Entity):
     def _on_close(self) -> None:
         for entity in reversed(list(self._members)):
             entity.close()
+
+
+def _changes_of(kind: type) -> tuple[str, ...]:
+    return tuple(item.name for item in fields(kind) if item.name.endswith("_change"))
+
+
+def _accumulated(before: Status, status: Status) -> Status:
+    """What ``status`` tells, its changes added to those that nobody has read."""
+    changes = {name: getattr(before, name) + getattr(status, name) for name in _changes_of(type(status))}
+    return replace(status, **changes) if changes else status
+
+
+def _unchanged(status: Any) -> Any:
+    return replace(status, **dict.fromkeys(_changes_of(type(status)), 0))
 
 
 def deadline_scope(timeout: float | None) -> trio.CancelScope:

@@ -5,19 +5,25 @@ DDS 1.4 §2.2.2.4.1 (Publisher), §2.2.2.5.2 (Subscriber).  A participant may st
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 from ..structure.errors import BadParameter, PreconditionNotMet
 from ..structure.qos import Qos
 from ..structure.qos_changes import check_changeable
+from ..structure.status import DataAvailable, DataOnReaders
 from .endpoint import Endpoint, follow_all
-from .entity import Parent
+from .entity import Entity, Parent
 from .topic import Topic
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
 
 __all__ = ["Publisher", "Subscriber", "check_family"]
+
+
+S = TypeVar("S")
+
+_ON_READERS = DataOnReaders(is_available=True)
 
 
 class _Group(Parent):
@@ -54,6 +60,23 @@ class Publisher(_Group):
 
 class Subscriber(_Group):
     """The readers created with it have its policies wherever they do not set their own."""
+
+    STATUSES: ClassVar[tuple[type, ...]] = (DataOnReaders,)
+
+    def status(self, kind: type[S]) -> S:
+        if kind is DataOnReaders:
+            return cast(S, DataOnReaders(is_available=bool(self._readers_with_news())))
+        return super().status(kind)
+
+    def status_changes(self) -> frozenset[type]:
+        return frozenset({DataOnReaders}) if self._readers_with_news() else frozenset()
+
+    def _readers_with_news(self) -> list[Entity]:
+        return [member for member in self._members if DataAvailable in member.status_changes()]
+
+    def _has_news(self) -> None:
+        for stream in self._streams:
+            stream.put(_ON_READERS)
 
 
 def check_family(parent: Parent, topic: Topic[Any], group: type[Publisher] | type[Subscriber]) -> DomainParticipant:

@@ -7,7 +7,7 @@ becomes a sample is theirs.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
 
 import trio
 
@@ -15,6 +15,7 @@ from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
 from ..structure.cache_change import CacheChange
 from ..structure.qos import Qos
 from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
+from ..structure.status import DataAvailable
 from ..transport import Pump
 from .conditions import ReadCondition
 from .entity import Entity
@@ -25,13 +26,17 @@ if TYPE_CHECKING:
 
 __all__ = ["SampleReader"]
 
+S = TypeVar("S")
 T = TypeVar("T")
 
+_AVAILABLE = DataAvailable(is_available=True)
 _UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
 
 
 class SampleReader(Entity, Generic[T]):
     """The base of DataReader and BuiltinTopicReader."""
+
+    STATUSES: ClassVar[tuple[type, ...]] = (DataAvailable,)
 
     _history: ReaderHistoryCache
 
@@ -40,6 +45,15 @@ class SampleReader(Entity, Generic[T]):
         self._participant = participant
         self._pump: Pump = participant._running_pump()
         self._news = trio.lowlevel.ParkingLot()
+
+    def status(self, kind: type[S]) -> S:
+        if kind is DataAvailable:
+            return cast(S, DataAvailable(is_available=self._history.has_news))
+        return super().status(kind)
+
+    def status_changes(self) -> frozenset[type]:
+        changes = super().status_changes()
+        return changes | {DataAvailable} if self._history.has_news else changes
 
     # --- reading -----------------------------------------------------------------------------------------
 
@@ -201,6 +215,8 @@ class SampleReader(Entity, Generic[T]):
         self._pump.woken(self._history, self._news)
         if self._changed:
             self._changed.unpark_all()
+        for stream in self._streams:
+            stream.put(_AVAILABLE)
 
     def _selection(
         self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int

@@ -40,6 +40,7 @@ class Topic(Entity, Generic[T]):
         self._name = name
         self._type = type_
         self._type_support: TypeSupport[T] = type_support(type_)
+        self._inconsistent_count = 0
         participant._adopt(self)
 
     @property
@@ -70,7 +71,8 @@ class Topic(Entity, Generic[T]):
 
     def _found_inconsistent(self, remote_type_name: str) -> None:
         """One of its writers or readers met a peer that uses the name with another type."""
-        total_count = self.status(InconsistentTopic).total_count + 1
+        total_count = self._inconsistent_count + 1
+        self._inconsistent_count = total_count
         self._status_changed(
             InconsistentTopic(total_count=total_count, total_count_change=1, remote_type_name=remote_type_name)
         )

@@ -1,7 +1,7 @@
 """The communication statuses, as the typed events that an application receives.
 
 DDS 1.4 §2.2.4.1 (Communication Status).  Each event holds the totals and what changed since the event
-before, so it serves as the value of the status too.  ``handle`` of a remote entity is its Guid.
+before; the value of a status, what changed since it was read last.  ``handle`` of a remote entity is its Guid.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from .dataclass import dataclass
 from .guid import GUID_UNKNOWN, Guid
 
 __all__ = [
+    "DataAvailable",
+    "DataOnReaders",
     "Incompatibility",
     "InconsistentTopic",
     "LivelinessChanged",
@@ -51,6 +53,20 @@ class Incompatibility:
 
     def __str__(self) -> str:
         return f"{self.policy}: offered {self.offered}, requested {self.requested}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataAvailable:
+    """There is something in a reader that came after it was looked into last."""
+
+    is_available: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataOnReaders:
+    """There is such a thing in a reader of the subscriber."""
+
+    is_available: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,7 +201,9 @@ class SecurityRevoked:
 
 
 Status = (
-    PublicationMatched
+    DataAvailable
+    | DataOnReaders
+    | PublicationMatched
     | SubscriptionMatched
     | OfferedIncompatibleQos
     | RequestedIncompatibleQos

@@ -283,3 +283,82 @@ async def test_asking_for_a_status_that_the_entity_has_not_names_those_it_has(do
         topic = ddsi.Topic(participant, "Square", Shape)
         with pytest.raises(ddsi.BadParameter, match=r"a Topic has the statuses InconsistentTopic, but no .*SampleLost"):
             topic.status(ddsi.SampleLost)
+
+
+@in_trio
+async def test_a_status_tells_what_changed_since_it_was_read_last(domain: int) -> None:
+    async with ddsi.DomainParticipant(domain) as participant:
+        topic = ddsi.Topic(participant, "Square", Shape)
+        writer = ddsi.DataWriter(participant, topic)
+        assert writer.status_changes() == frozenset()
+        readers = [ddsi.DataReader(participant, topic) for _ in range(3)]
+        readers.pop().close()
+        assert writer.status_changes() == {ddsi.PublicationMatched}
+        status = writer.status(ddsi.PublicationMatched)
+        assert (status.total_count, status.total_count_change) == (3, 3)
+        assert (status.current_count, status.current_count_change) == (2, 2)
+        assert writer.status_changes() == frozenset()
+        again = writer.status(ddsi.PublicationMatched)
+        assert (again.total_count, again.total_count_change, again.current_count_change) == (3, 0, 0)
+        readers.pop().close()
+        status = writer.status(ddsi.PublicationMatched)
+        assert (status.total_count_change, status.current_count_change) == (0, -1)
+
+
+@in_trio
+async def test_events_tell_their_own_change_whoever_reads_the_status(domain: int) -> None:
+    async with ddsi.DomainParticipant(domain) as participant:
+        topic = ddsi.Topic(participant, "Square", Shape)
+        writer = ddsi.DataWriter(participant, topic)
+        for _ in range(2):
+            ddsi.DataReader(participant, topic)
+        writer.status(ddsi.PublicationMatched)
+        events = writer.events()
+        assert [(await anext(events)).total_count_change for _ in range(2)] == [1, 1]  # type: ignore[union-attr]
+
+
+# --- data ----------------------------------------------------------------------------------------------------------
+
+
+@in_trio
+async def test_data_are_a_status_of_the_reader_and_of_its_subscriber(domain: int) -> None:
+    async with ddsi.DomainParticipant(domain) as participant:
+        topic = ddsi.Topic(participant, "Square", Shape)
+        subscriber = ddsi.Subscriber(participant)
+        reader = ddsi.DataReader(subscriber, topic, RELIABLE)
+        writer = ddsi.DataWriter(participant, topic, RELIABLE)
+        events, group_events = reader.events(), subscriber.events()
+        assert not reader.status(ddsi.DataAvailable).is_available
+        assert not subscriber.status(ddsi.DataOnReaders).is_available
+        for number in range(3):
+            await writer.write(Shape("RED", number))
+        assert await event_of_stream(events, ddsi.DataAvailable) == ddsi.DataAvailable(is_available=True)
+        assert await anext(group_events) == ddsi.DataOnReaders(is_available=True)
+        assert reader.status(ddsi.DataAvailable).is_available
+        assert subscriber.status(ddsi.DataOnReaders).is_available
+        assert reader.status_changes() == {ddsi.DataAvailable, ddsi.SubscriptionMatched, ddsi.LivelinessChanged}
+        assert subscriber.status_changes() == {ddsi.DataOnReaders}
+        reader.read()
+        assert not reader.status(ddsi.DataAvailable).is_available
+        assert not subscriber.status(ddsi.DataOnReaders).is_available
+
+
+@in_trio
+async def test_data_that_nobody_reads_is_one_event_and_crowds_nothing_out(domain: int) -> None:
+    async with pair(domain, local=True) as p:
+        events = p.reader.events()
+        for number in range(2000):
+            await p.writer.write(Shape("RED", number))
+            if number % 100 == 0:
+                p.reader.read(1)
+        p.reader.close()
+        assert events.dropped == 0
+        kinds = [type(event) async for event in events]
+        assert kinds == [ddsi.SubscriptionMatched, ddsi.LivelinessChanged, ddsi.DataAvailable]
+
+
+async def event_of_stream(events: ddsi.EventStream, kind: type[S]) -> S:
+    async for event in events:
+        if isinstance(event, kind):
+            return event
+    raise AssertionError("the events have ended")
