@@ -26,6 +26,7 @@ from ..structure.sample_info import (
     SampleState,
     ViewState,
 )
+from .content_filter import ContentFilter
 from .instance import Instance
 from .instance_order import InstanceOrder
 from .sample_gate import SampleGate
@@ -81,6 +82,7 @@ class ReaderHistoryCache:
         self._on_rejected = on_rejected
         self._has_news = False
         self.is_withholding = False  # did a reliable writer's sample find no room?
+        self.content_filter: ContentFilter | None = None  # what does not pass has been received, and is not kept
         self._withheld: dict[bytes, int] = {}  # by writer: the number that found none last
         self._by_source = isinstance(qos.destination_order, BySourceTimestamp)
         self._instances: dict[bytes, Instance] = {}
@@ -113,6 +115,8 @@ class ReaderHistoryCache:
 
     def add(self, change: CacheChange, now: float) -> bool:
         """Take one change; False when a reliable writer's has to wait until the application has taken something."""
+        if self.content_filter is not None and not self.content_filter.passes(change):
+            return True
         instance = self._instances.get(change.key)
         if instance is None:
             if change.kind is not ChangeKind.ALIVE:
