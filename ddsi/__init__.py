@@ -25,6 +25,7 @@ from .config import Config
 from .config.secure import secure
 from .dcps import (
     BuiltinTopicReader,
+    ContentFilteredTopic,
     DataReader,
     DataWriter,
     DomainParticipant,
@@ -140,6 +141,7 @@ __all__ = [
     "BySourceTimestamp",
     "Config",
     "ConfigurationError",
+    "ContentFilteredTopic",
     "DataAvailable",
     "DataOnReaders",
     "DataReader",

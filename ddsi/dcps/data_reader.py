@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import trio
 
+from ..behavior.content_filter import Evaluate
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..engine import KeyCodec, LocalReader, publication_data
 from ..structure.builtin_topic_data import PublicationBuiltinTopicData
 from ..structure.cache_change import CacheChange
+from ..structure.discovered import ContentFilterProperty
 from ..structure.errors import BadParameter, DdsTimeout, MalformedSample
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, reader_qos
@@ -28,6 +30,7 @@ from ..structure.status import (
     Status,
     SubscriptionMatched,
 )
+from .content_filtered_topic import ContentFilteredTopic
 from .endpoint import Endpoint, QosPlan
 from .entity import deadline_scope
 from .groups import Subscriber, check_family
@@ -60,11 +63,21 @@ class DataReader(SampleReader[T], Endpoint):
         SecurityRefused,
     )
 
-    def __init__(self, parent: DomainParticipant | Subscriber, topic: Topic[T], qos: Qos | None = None) -> None:
+    def __init__(
+        self,
+        parent: DomainParticipant | Subscriber,
+        topic: Topic[T] | ContentFilteredTopic[T],
+        qos: Qos | None = None,
+    ) -> None:
         """``qos`` goes before the subscriber's, and that before the topic's; the rest is the OMG's default.
 
-        Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
+        Of a ContentFilteredTopic it gets only what passes; its own topic is the related one then.  Raises
+        InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created.
         """
+        filtered: ContentFilteredTopic[T] | None = None
+        if isinstance(topic, ContentFilteredTopic):
+            topic._check_open()
+            filtered, topic = topic, topic.related_topic
         participant = check_family(parent, topic, Subscriber)
         super().__init__(participant, qos)
         self._parent = parent
@@ -82,11 +95,15 @@ class DataReader(SampleReader[T], Endpoint):
             self._pump.now(),
             is_keyed=support.is_keyed,
             keys=_key_codec(topic) if support.is_keyed else None,
+            content_filter=(filtered._announced, filtered._evaluate) if filtered is not None else None,
             type_information=support.type_information if self._pump.engine.config.announce_types else b"",
         )
         history = self._reader.history
         assert history is not None
         self._history: ReaderHistoryCache = history
+        self._filtered = filtered
+        if filtered is not None:
+            filtered._readers.add(self)
         parent._adopt(self)
         participant._register(self._reader.guid, self)
         self._pump.settle()
@@ -97,6 +114,11 @@ class DataReader(SampleReader[T], Endpoint):
     @property
     def topic(self) -> Topic[T]:
         return self._topic
+
+    @property
+    def content_filtered_topic(self) -> ContentFilteredTopic[T] | None:
+        """What it was made of, if that was not the topic itself."""
+        return self._filtered
 
     @property
     def guid(self) -> Guid:
@@ -161,6 +183,11 @@ class DataReader(SampleReader[T], Endpoint):
     def _follow(self, plan: QosPlan) -> None:
         self._pump.engine.qos_changes.change_reader(self._reader, plan.resolved, self._pump.now())
         super()._follow(plan)
+        self._pump.settle()
+
+    def _set_content_filter(self, announced: ContentFilterProperty, evaluate: Evaluate) -> None:
+        """Its content-filtered topic has other parameters."""
+        self._pump.engine.set_content_filter(self._reader, announced, evaluate, self._pump.now())
         self._pump.settle()
 
     def _sample(self, info: SampleInfo, change: CacheChange) -> Sample[T] | None:
