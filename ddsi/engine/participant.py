@@ -370,13 +370,6 @@ class Participant:
         reader.data = replace(reader.data, content_filter=announced)
         self.discovery.announce_reader(reader, now)
 
-    def set_content_filter(self, reader: LocalReader, announced: ContentFilterProperty, evaluate: Evaluate) -> None:
-        """From now on the reader lets something else pass; its writers are told.  What it holds it keeps."""
-        assert reader.history is not None
-        reader.history.content_filter = ContentFilter(announced, evaluate)
-        reader.data = replace(reader.data, content_filter=announced)
-        self.discovery.announce_reader(reader, self.now)
-
     def delete_writer(self, writer: LocalWriter, now: float) -> None:
         """Say that it is gone; but first its readers may, for a second at most, ask for what they miss."""
         self.now = now
