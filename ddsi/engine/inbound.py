@@ -30,7 +30,7 @@ from ..spi import NoKeys, NotForUs, Octets, Outcome, Protection, Rejected
 from ..structure.builtin_entity_ids import SPDP_WRITER
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.errors import MalformedMessage, MalformedSample
-from ..structure.guid import Guid
+from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason, SampleLossReason
@@ -441,7 +441,16 @@ class Inbound:
             if self._may_ask(incoming, _WORK_OF_A_PARTICIPANT):
                 self._engine.discovery.receive_spdp(incoming, change)
             return
-        reason = DropReason.UNKNOWN_PARTICIPANT if incoming.participant is None else DropReason.UNMATCHED
+        self._unmatched(incoming, writer_id)
+
+    def _unmatched(self, incoming: Incoming, writer_id: bytes) -> None:
+        """No reader of ours is matched with the writer that says something."""
+        reason = DropReason.UNMATCHED
+        if incoming.participant is None:
+            reason = DropReason.UNKNOWN_PARTICIPANT
+        elif not EntityId(writer_id).is_builtin:
+            if self._engine.known_writers.get(Guid(incoming.prefix + writer_id)) is None:
+                reason = DropReason.UNKNOWN_WRITER
         self._engine.dropped(reason, incoming.source)
 
     def _data_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
@@ -452,7 +461,7 @@ class Inbound:
         _check_number(data.writer_sn, raw)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
-            self._engine.dropped(DropReason.UNMATCHED, incoming.source)
+            self._unmatched(incoming, data.writer_id)
             return
         if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
@@ -543,7 +552,7 @@ class Inbound:
             return []
         remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
         if remote is None:
-            self._engine.dropped(DropReason.UNMATCHED, incoming.source)
+            self._unmatched(incoming, writer_id)
             return []
         if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)

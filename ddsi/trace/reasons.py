@@ -57,8 +57,6 @@ class DropReason(StrEnum):
     """A HEARTBEAT, ACKNACK or fragment submessage whose count is not newer than the last."""
     DUPLICATE = "duplicate"
     """This change, or this fragment, is here already."""
-    OUT_OF_WINDOW = "out_of_window"
-    """Too far ahead of what is missing to be kept; it will be asked for again."""
     OUT_OF_ORDER = "out_of_order"
     """Older than what a best-effort reader has already handed over."""
     INVALID_SEQUENCE = "invalid_sequence"

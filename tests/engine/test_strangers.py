@@ -323,4 +323,15 @@ def test_heartbeats_for_all_readers_of_a_stranger_are_not_answered_before_it_is_
     beat = Heartbeat(EntityId.UNKNOWN, ids.SEDP_PUBLICATIONS_WRITER, 1, 5, 1).encode()
     participant.receive_datagram(stranger.message(beat), stranger.address, 0.0)
     assert sent(participant) == []
-    assert participant.drops == {DropReason.UNMATCHED: 1}
+    assert participant.drops == {DropReason.UNKNOWN_PARTICIPANT: 1}
+
+
+def test_what_a_known_participant_says_by_a_writer_it_never_announced_is_counted_so() -> None:
+    participant = engine()
+    stranger = Stranger()
+    participant.receive_datagram(
+        stranger.directed(participant.guid.prefix, stranger.spdp()[20:]), stranger.address, 0.0
+    )
+    beat = Heartbeat(EntityId.UNKNOWN, EntityId(b"\0\0\1\2"), 1, 5, 1).encode()
+    participant.receive_datagram(stranger.message(beat), stranger.address, 0.0)
+    assert participant.drops == {DropReason.UNKNOWN_WRITER: 1}
