@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+from weakref import WeakValueDictionary
 
 import trio
 
@@ -39,6 +40,7 @@ from .endpoint import Endpoint
 from .entity import Entity, Parent, deadline_scope
 from .lifetime import Lifetime
 from .type_access import AnnouncedEndpoint, fetch_type_object, fetch_type_objects
+from .type_discovery import endpoint_type, find_type
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
@@ -87,6 +89,7 @@ class DomainParticipant(Parent):
         self._lifetime: Lifetime | None = None
         self._by_guid: dict[Guid, Entity] = {}
         self._discovery_lot = trio.lowlevel.ParkingLot()
+        self._dynamic_types: WeakValueDictionary[tuple[str, bytes], type[Any]] = WeakValueDictionary()
 
     def __repr__(self) -> str:
         state = "closed" if self._is_closed else str(self._pump.engine.guid.prefix) if self._pump else "not entered"
@@ -239,6 +242,21 @@ class DomainParticipant(Parent):
         Raises as :meth:`type_objects` does, and BadParameter for an identifier that stands for no TypeObject.
         """
         return await fetch_type_object(self, identifier, owner, timeout)
+
+    async def discover_type(self, topic_name: str, *, timeout: float | None = 10.0) -> type[Any]:
+        """The type of a topic that others write or read, as a class for ``Topic(participant, topic_name, ...)``.
+
+        Waits until somebody announces the topic and tells its type; of several types, the first that can be had, of
+        writers before readers.  It is that of :func:`ddsi.dynamic_type`.
+
+        Raises DdsTimeout when nobody announced the topic within ``timeout`` seconds, and PreconditionNotMet, saying
+        why, where those who did tell no more than the type's name: then the program must bring the type (``idl.load``).
+        """
+        return await find_type(self, topic_name, timeout)
+
+    async def endpoint_type(self, endpoint: AnnouncedEndpoint, *, timeout: float | None = 10.0) -> type[Any]:
+        """The type of one remote writer or reader, as a class.  Raises as :meth:`type_objects` does."""
+        return await endpoint_type(self, endpoint, timeout)
 
     def knows_all_announced(self) -> bool:
         """Has every endpoint come that the participants known now had when they were discovered?

@@ -42,7 +42,7 @@ from .entity import deadline_scope
 if TYPE_CHECKING:
     from .participant import DomainParticipant
 
-__all__ = ["AnnouncedEndpoint", "fetch_type_object", "fetch_type_objects"]
+__all__ = ["AnnouncedEndpoint", "fetch_type_object", "fetch_type_objects", "information_of_endpoint"]
 
 AnnouncedEndpoint = (
     DiscoveredWriterData | DiscoveredReaderData | PublicationBuiltinTopicData | SubscriptionBuiltinTopicData
@@ -57,7 +57,7 @@ async def fetch_type_objects(
 ) -> BuiltTypes:
     """See :meth:`DomainParticipant.type_objects`."""
     guid = endpoint.guid if isinstance(endpoint, (DiscoveredWriterData, DiscoveredReaderData)) else endpoint.key
-    information = _information(endpoint)
+    information = information_of_endpoint(endpoint)
     root = next((one for one in (information.complete, information.minimal) if _is_hashed(one)), None)
     if not isinstance(root, (HashIdentifier, ComponentIdentifier)):
         raise PreconditionNotMet(f"what {guid} announces of its type {endpoint.type_name!r} names no TypeObject")
@@ -102,7 +102,8 @@ async def _fetched(
     raise DdsTimeout(f"{what} did not come within {timeout} s")
 
 
-def _information(endpoint: AnnouncedEndpoint) -> TypeInformation:
+def information_of_endpoint(endpoint: AnnouncedEndpoint) -> TypeInformation:
+    """What it announces of its type.  PreconditionNotMet where that is nothing."""
     if not endpoint.type_information:
         raise PreconditionNotMet(
             f"the endpoint of topic {endpoint.topic_name!r} announces no type information, but only the type's name, "
