@@ -22,6 +22,7 @@ The names below are the public face; everything else may change.
 """
 
 from .config import Config
+from .config.qos_profiles import QosProvider
 from .config.secure import secure
 from .dcps import (
     BuiltinTopicReader,
@@ -192,6 +193,7 @@ __all__ = [
     "PublicationMatched",
     "Publisher",
     "Qos",
+    "QosProvider",
     "ReadCondition",
     "ReaderDataLifecycle",
     "Reliable",
