@@ -23,7 +23,7 @@ from .enumerations import bitmask_from
 from .layout import ALIGNED, UNKNOWN, Encoding, emheader_length_code, has_dheader, static_size
 from .model import Composite, Extensibility, Member, StructType, UnionType
 from .read_emitter import ReadEmitter
-from .read_values import ValueReader, enumerations, numpy_numbers
+from .read_values import ValueReader, enumerations
 from .recursion import FunctionPlan
 from .source import Source
 from .write_source import PID_EXTENDED_MUST_UNDERSTAND, PID_LIST_END_MUST_UNDERSTAND
@@ -47,7 +47,6 @@ def generate_reader(
         "booleans_from": buffers.booleans_from,
         "wchars_from": buffers.wchars_from,
         "nest": buffers.nest,
-        "numpy_numbers": numpy_numbers,
         "enumerations": enumerations,
         "bitmask_from": bitmask_from,
         "bitset_from": bitset_from,

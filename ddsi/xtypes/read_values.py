@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from .buffers import needs_swap
-from .defaults import numpy_array, numpy_dtype
+from .defaults import numpy_dtype
 from .layout import ALIGNED, UNKNOWN, Encoding, after, has_dheader
 from .model import (
     BOOLEAN,
@@ -33,20 +33,41 @@ from .recursion import FunctionPlan
 from .source import Source
 from .stride import Stride, stride
 
-__all__ = ["ValueReader", "enumerations", "numpy_numbers"]
+__all__ = ["ValueReader", "enumerations", "numpy_reader"]
 
 _IN_RUN = 256
 """Arrays of primitives up to so many octets are part of a run; larger ones are copied only once."""
 
 
-def numpy_numbers(type_: SequenceType | ArrayType, order: str, octets: Any, start: int, end: int) -> Any:
-    """A numpy array of the numbers in ``octets[start:end]``, in this machine's byte order and memory of its own."""
-    import numpy
+def numpy_reader(type_: SequenceType | ArrayType, order: str) -> Callable[[Any, int, int], Any]:
+    """The function of octets, start and end that returns the numbers there as a numpy array, in this machine's byte
+    order and memory of its own.  It raises ValueError where they are not there, or are no booleans."""
+    import numpy  # here, since the user's annotation named it
 
     assert isinstance(type_.element, Primitive)
-    count = (end - start) // type_.element.size
-    found: Any = numpy.frombuffer(octets, numpy_dtype(type_.element, order), count, start) if count else []
-    return numpy_array(type_, found)
+    size = type_.element.size
+    own = numpy.dtype(numpy_dtype(type_.element))
+    sent = numpy.dtype("u1" if type_.element == BOOLEAN else numpy_dtype(type_.element, order))
+    frombuffer, nothing = numpy.frombuffer, numpy.empty(0, own)
+
+    def numbers(octets: Any, start: int, end: int) -> Any:
+        if start == end:
+            return nothing.copy()
+        return frombuffer(octets, sent, (end - start) // size, start).astype(own)
+
+    def booleans(octets: Any, start: int, end: int) -> Any:
+        if start == end:
+            return nothing.copy()
+        found = frombuffer(octets, sent, end - start, start)
+        if found.max() > 1:
+            raise ValueError
+        return found.astype(own)
+
+    read = booleans if type_.element == BOOLEAN else numbers
+    if not isinstance(type_, ArrayType) or len(type_.dimensions) == 1:
+        return read
+    dimensions = type_.dimensions
+    return lambda octets, start, end: read(octets, start, end).reshape(dimensions)
 
 
 def enumerations(d: Any, start: int, count: int, item_format: str, size: int, make: Callable[[int], Any]) -> list[Any]:
@@ -178,8 +199,8 @@ class ValueReader:
         piece = f"d[{start}:{end}]"
         name = self._source.fresh("a")
         if type_.numpy:
-            described = self._source.constant("type_", type_)
-            expression = f"numpy_numbers({described}, '{self._encoding.order}', d, {start}, {end})"
+            read = self._source.constant("numpy_", numpy_reader(type_, self._encoding.order))
+            expression = f"{read}(d, {start}, {end})"
         elif element.is_octet:
             expression = f"bytes({piece})" if self._view else piece
         elif element.is_number:

@@ -8,9 +8,10 @@ from collections import UserList
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from ddsi.structure.errors import BadParameter
+from ddsi.structure.errors import BadParameter, MalformedSample
 from ddsi.structure.qos_policies import DataRepresentationId
 from ddsi.xtypes import deserialize, idl, serialize
 from ddsi.xtypes.careful_reader import read_carefully
@@ -130,3 +131,32 @@ def test_strings_lie_as_the_careful_reader_expects(names: Any, representation: D
 def test_a_string_that_does_not_fit_is_named(names: Any, reason: str) -> None:
     with pytest.raises(BadParameter, match=reason):
         serialize(Names(1, names, ["", ""], 1))
+
+
+@idl.struct(extensibility=idl.FINAL)
+class Arrays:
+    mask: Annotated[npt.NDArray[np.bool_], idl.sequence_of(idl.boolean)]
+    matrix: Annotated[npt.NDArray[np.float32], idl.array_of(idl.float32, 2, 3)]
+    series: Annotated[npt.NDArray[np.int64], idl.sequence_of(idl.int64)]
+
+
+@pytest.mark.parametrize("byteorder", ["little", "big"])
+@pytest.mark.parametrize("length", [0, 1, 5])
+def test_numpy_arrays_are_the_readers_own(byteorder: Any, length: int) -> None:
+    sample = Arrays(np.arange(length) % 2 == 0, np.eye(2, 3, dtype=np.float32), np.arange(length))
+    octets = serialize(sample, byteorder=byteorder)
+    for read in (deserialize(Arrays, octets), read_carefully(struct_type(Arrays), octets)):
+        assert read == sample
+        for name in ("mask", "matrix", "series"):
+            found = getattr(read, name)
+            assert found.dtype is getattr(sample, name).dtype
+            found[...] = 1  # neither the payload's memory nor another sample's
+    assert deserialize(Arrays, octets) == sample
+
+
+def test_a_boolean_of_two_is_malformed() -> None:
+    octets = bytearray(serialize(Arrays(np.array([True, False]), np.zeros((2, 3), np.float32), np.arange(3))))
+    octets[9] = 2
+    for length in (len(octets), len(octets) - 8):
+        with pytest.raises(MalformedSample, match="mask"):
+            deserialize(Arrays, bytes(octets[:length]))
