@@ -29,6 +29,7 @@ QUICK_AMONG_OURS = (
     "Durability_17",
     "Ownership_3",
     "Deadline_3",
+    "Cft_1",
 )
 QUICK_WITH_CYCLONE = (
     "DataRepresentation_0",

@@ -28,7 +28,7 @@ from ..structure.qos_policies import (
 )
 from .shape_main_options import ShapeMainOptions
 
-__all__ = ["endpoint_qos", "group_qos", "participant_config", "unsupported"]
+__all__ = ["content_filter", "endpoint_qos", "group_qos", "participant_config", "unsupported"]
 
 _DURABILITIES: dict[str, type[Durability]] = {
     "v": Volatile,
@@ -45,14 +45,22 @@ def unsupported(options: ShapeMainOptions) -> str | None:
 
     Better said than done half: the suite tells "cannot" from "does it wrong".
     """
-    filters = not options.publishes and (options.color is not None or options.filter_expression is not None)
     features = (
         ("Presentation Coherent Access", options.is_coherent),
         ("Presentation Ordered Access", options.is_ordered),
         ("Presentation Access Scope", options.access_scope in ("t", "g")),
-        ("Content filtered topic", filters),
     )
     return next((f"{feature} = not supported" for feature, is_wanted in features if is_wanted), None)
+
+
+def content_filter(options: ShapeMainOptions) -> tuple[str, tuple[str, ...]] | None:
+    """Expression and parameters of a subscriber's filter; None if it is to get everything."""
+    if options.publishes:
+        return None
+    if options.color is not None:
+        quoted = options.color.replace("'", "''")
+        return "color = %0", (f"'{quoted}'",)
+    return (options.filter_expression, ()) if options.filter_expression is not None else None
 
 
 def participant_config(options: ShapeMainOptions, config: Config) -> Config:

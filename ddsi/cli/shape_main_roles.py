@@ -9,11 +9,11 @@ import random
 
 import trio
 
-from ..dcps import DataReader, DataWriter, DomainParticipant, Publisher, Sample, Subscriber, Topic
-from ..structure.errors import DdsTimeout
+from ..dcps import ContentFilteredTopic, DataReader, DataWriter, DomainParticipant, Publisher, Sample, Subscriber, Topic
+from ..structure.errors import BadParameter, DdsTimeout
 from .shape_main_lines import sample_line, state_line, status_line
 from .shape_main_options import ShapeMainOptions
-from .shape_main_qos import endpoint_qos, group_qos
+from .shape_main_qos import content_filter, endpoint_qos, group_qos
 from .shape_motion import MovingShape
 from .shape_types import Shape, shape_form
 
@@ -133,10 +133,24 @@ class SubscribingRole(Role):
     def create(self, topics: list[Topic[Shape]], participant: DomainParticipant, nursery: trio.Nursery) -> None:
         subscriber = Subscriber(participant, group_qos(self.options))
         for topic in topics:
-            print(f"Create reader for topic: {topic.name}")
-            reader = DataReader(subscriber, topic, endpoint_qos(self.options))
+            wanted = self._filtered(participant, topic)
+            print(f"Create reader for topic: {wanted.name}")
+            reader = DataReader(subscriber, wanted, endpoint_qos(self.options))
             self.readers.append(reader)
             nursery.start_soon(self.watch, reader)
+
+    def _filtered(
+        self, participant: DomainParticipant, topic: Topic[Shape]
+    ) -> Topic[Shape] | ContentFilteredTopic[Shape]:
+        """The topic with the filter that was asked for; itself if none was."""
+        wanted = content_filter(self.options)
+        if wanted is None:
+            return topic
+        try:
+            return ContentFilteredTopic(participant, f"{topic.name}_filtered", topic, *wanted)
+        except BadParameter:
+            print("failed to create content filtered topic")
+            raise
 
     @property
     def period_s(self) -> float:

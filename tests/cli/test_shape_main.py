@@ -12,7 +12,7 @@ import pytest
 from ddsi.cli.shape_main import main
 from ddsi.cli.shape_main_lines import sample_line, state_line, status_line
 from ddsi.cli.shape_main_options import OptionError, ShapeMainOptions, option_parser, parse_options, warnings
-from ddsi.cli.shape_main_qos import endpoint_qos, group_qos, participant_config, unsupported
+from ddsi.cli.shape_main_qos import content_filter, endpoint_qos, group_qos, participant_config, unsupported
 from ddsi.cli.shape_types import shape_form
 from ddsi.config import Config
 from ddsi.structure import qos_policies as p
@@ -132,7 +132,7 @@ def test_announcements_and_fragments_are_configuration() -> None:
     assert participant_config(_options("-P"), Config(fragment_size=1000)) == Config(fragment_size=1000)
 
 
-@pytest.mark.parametrize("words", ["-S --cft x=1", "-S -c RED", "-P --coherent", "-S --ordered", "-P --access-scope g"])
+@pytest.mark.parametrize("words", ["-P --coherent", "-S --ordered", "-P --access-scope g"])
 def test_what_cannot_be_done_ends_with_the_words_that_the_suite_looks_for(
     words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -144,10 +144,32 @@ def test_what_cannot_be_done_ends_with_the_words_that_the_suite_looks_for(
 
 
 @pytest.mark.parametrize(
-    "words", ["-P -c RED -f 1 -s 1 --lifespan 1", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"]
+    "words", ["-P -c RED -f 1 -s 1 --lifespan 1", "-S -c RED", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"]
 )
 def test_what_can_be_done_is_done(words: str) -> None:
     assert unsupported(_options(words)) is None
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("-S", None),
+        ("-P -c RED", None),
+        ("-S -c RED", ("color = %0", ("'RED'",))),
+        ("-S -c it's", ("color = %0", ("'it''s'",))),
+        ("-S --cft x=1", ("x=1", ())),
+    ],
+)
+def test_a_subscriber_filters_by_color_or_by_expression(words: str, expected: object) -> None:
+    assert content_filter(_options(words)) == expected
+
+
+def test_a_filter_that_cannot_be_meant_is_said_in_the_suite_s_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["-t", "Square", "-d", "231", "-S", "--cft", "siz = 1"]) == 2
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-2] == "failed to create content filtered topic"
+    assert "did you mean" in lines[-1] or "has no member 'siz'" in lines[-1]
+    assert not any("Create reader" in line for line in lines)
 
 
 # --- lines -----------------------------------------------------------------------------------------------
