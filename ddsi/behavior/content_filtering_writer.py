@@ -155,7 +155,7 @@ class ContentFilteringWriter(StatefulWriter):
     def piggyback_heartbeat(self) -> SendHeartbeat | None:
         return super().piggyback_heartbeat() if not self._filtering else None
 
-    def assert_liveliness(self) -> list[WriterTransmission]:
+    def assert_liveliness(self) -> list[SendHeartbeat]:
         if not self._filtering:
             return super().assert_liveliness()
         reliable = [proxy for proxy in self.readers.values() if self.is_reliable and proxy.is_reliable]

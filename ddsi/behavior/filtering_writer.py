@@ -16,6 +16,7 @@ from __future__ import annotations
 from itertools import takewhile
 
 from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.coherence import Coherence
 from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.qos import EndpointQos
 from .dropping import WhenDropped, drop_silently
@@ -73,9 +74,18 @@ class FilteringWriter(StatefulWriter):
         key_hash: bytes = b"",
         destination: Guid = GUID_UNKNOWN,
         related: tuple[Guid, int] | None = None,
+        coherence: Coherence | None = None,
     ) -> CacheChange:
         change = super().new_change(
-            kind, payload, key, source_timestamp, now, key_hash=key_hash, destination=destination, related=related
+            kind,
+            payload,
+            key,
+            source_timestamp,
+            now,
+            key_hash=key_hash,
+            destination=destination,
+            related=related,
+            coherence=coherence,
         )
         self._held.setdefault(destination, {})[change.sequence_number] = None
         return change
@@ -117,7 +127,7 @@ class FilteringWriter(StatefulWriter):
         self._heartbeat_count += 1
         return SendHeartbeat(first, last, self._heartbeat_count, proxy.acked_sn >= last, (proxy,), liveliness)
 
-    def assert_liveliness(self) -> list[WriterTransmission]:
+    def assert_liveliness(self) -> list[SendHeartbeat]:
         reliable = [proxy for proxy in self.readers.values() if self.is_reliable and proxy.is_reliable]
         return [self.directed_heartbeat(proxy, liveliness=True) for proxy in reliable]
 

@@ -10,13 +10,13 @@ deserialising is done when a sample is taken, by whoever takes it.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 
 from ..structure.cache_change import CacheChange, ChangeKind, StatusInfo
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos
-from ..structure.qos_policies import LENGTH_UNLIMITED, BySourceTimestamp, KeepLast
+from ..structure.qos_policies import LENGTH_UNLIMITED, AccessScope, BySourceTimestamp, KeepLast
 from ..structure.sample_info import (
     ANY_INSTANCE_STATE,
     ANY_SAMPLE_STATE,
@@ -76,11 +76,14 @@ class ReaderHistoryCache:
             min(limits.max_instances, max_instances) if limits.max_instances != unlimited else max_instances
         )
         self._max_octets = max_octets
+        presentation = qos.presentation
+        self._keeps_arrival_order = presentation.ordered_access and presentation.access_scope > AccessScope.INSTANCE
         self._is_reliable = qos.is_reliable
         self._clock_offset = clock_offset
         self._on_news = on_news
         self._on_rejected = on_rejected
         self._has_news = False
+        self.arrivals: Iterator[int] | None = None  # numbers the samples of several readers as they come
         self.is_withholding = False  # did a reliable writer's sample find no room?
         self.content_filter: ContentFilter | None = None  # what does not pass has been received, and is not kept
         self._withheld: dict[bytes, int] = {}  # by writer: the number that found none last
@@ -150,6 +153,8 @@ class ReaderHistoryCache:
         info = SampleInfo(change, now + self._clock_offset, valid_data=True)
         info.disposed_generation_count = instance.disposed_generation_count
         info.no_writers_generation_count = instance.no_writers_generation_count
+        if self.arrivals is not None:
+            info.arrival = next(self.arrivals)
         if self._by_source and samples:
             self._insert_by_source(samples, info, _stamp(change))
         else:
@@ -234,6 +239,8 @@ class ReaderHistoryCache:
             info.instance_handle = instance.key
             info.disposed_generation_count = instance.disposed_generation_count
             info.no_writers_generation_count = instance.no_writers_generation_count
+            if self.arrivals is not None:
+                info.arrival = next(self.arrivals)
             instance.samples.append(info)
             self._order.append(info)
             self._octets += len(change.payload)
@@ -293,6 +300,40 @@ class ReaderHistoryCache:
         if self._octets and self._octets + octets > self._max_octets:
             return "octets of history"
         return None
+
+    def lacks_room_for(self, changes: Sequence[CacheChange], *, when_empty: bool = False) -> str | None:
+        """The limit that forbids taking all of these now, or ``when_empty``, by name; None if there is room."""
+        samples = octets = 0
+        added: dict[bytes, int] = {}
+        instance_count = 0 if when_empty else len(self._instances)
+        for change in changes:
+            if change.kind is not ChangeKind.ALIVE:
+                continue
+            instance = None if when_empty else self._instances.get(change.key)
+            if instance is None and change.key not in added:
+                instance_count += 1
+                if instance_count > self._max_instances:
+                    return "max_instances"
+            octets += len(change.payload)
+            held = (len(instance.samples) if instance is not None else 0) + added.setdefault(change.key, 0)
+            if self._depth and held - (instance.end_count if instance is not None else 0) >= self._depth:
+                continue  # it takes the place of another
+            if self._max_per_instance and held >= self._max_per_instance:
+                return "max_samples_per_instance"
+            added[change.key] += 1
+            samples += 1
+        if self._max_samples and samples and (0 if when_empty else len(self)) + samples > self._max_samples:
+            return "max_samples"
+        before = 0 if when_empty else self._octets
+        return "octets of history" if before and before + octets > self._max_octets else None
+
+    def no_room_for(self, changes: Sequence[CacheChange], limit: str) -> bool:
+        """These have to become visible together, and cannot: False if a reliable writer's may once the application has
+        taken something, True if they are rejected."""
+        if self._is_reliable and self.lacks_room_for(changes, when_empty=True) is None:
+            return self._no_room(limit, changes[-1])
+        self._on_rejected(limit, changes[-1], True)
+        return True
 
     def _no_room(self, limit: str, change: CacheChange) -> bool:
         if not self._is_reliable:
@@ -494,6 +535,8 @@ class ReaderHistoryCache:
                 and (selector is None or selector(info))
             ):
                 chosen.append((info, instance))
+        if not self._keeps_arrival_order and len(self._instances) > 1:
+            chosen = _by_instance(chosen)
         if touch:
             self._mark_access(chosen)
         return chosen
@@ -524,6 +567,17 @@ def _stamp(change: CacheChange | None) -> tuple[int, bytes]:
     """What BY_SOURCE_TIMESTAMP orders by; where two writers wrote at once all readers decide alike (§2.2.3.17)."""
     assert change is not None
     return change.source_timestamp, change.writer_guid
+
+
+def _by_instance(chosen: list[tuple[SampleInfo, Instance]]) -> list[tuple[SampleInfo, Instance]]:
+    """Samples of one instance follow each other; instances and samples each in the order of arrival.
+
+    DDS 1.4 §2.2.2.5.3.8 (read): so it is unless ordered access beyond single instances was asked for.
+    """
+    of_instance: dict[bytes, list[tuple[SampleInfo, Instance]]] = {}
+    for entry in chosen:
+        of_instance.setdefault(entry[0].instance_handle, []).append(entry)
+    return [entry for entries in of_instance.values() for entry in entries]
 
 
 def _generation(info: SampleInfo) -> int:

@@ -13,8 +13,10 @@ from __future__ import annotations
 import heapq
 import math
 from collections import deque
+from dataclasses import replace
 
 from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.coherence import Coherence
 from ..structure.discovered import DiscoveredReaderData
 from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.locator import Locator
@@ -64,6 +66,8 @@ class StatefulWriter:
         self.local_readers: dict[Guid, ReaderProxy] = {}
         self.locators: tuple[Locator, ...] = ()
         self.next_unsent_sn = 1
+        self.is_suspended = False  # the application has asked that nothing new be sent for now
+        self.has_group_news = False  # readers are to be told how far the other writers of its publisher are
         self.window = SendWindow()
         self.heartbeat = HeartbeatSchedule()
         self._reliable_readers = 0
@@ -125,6 +129,7 @@ class StatefulWriter:
         key_hash: bytes = b"",
         destination: Guid = GUID_UNKNOWN,
         related: tuple[Guid, int] | None = None,
+        coherence: Coherence | None = None,
     ) -> CacheChange:
         """Add a change to the history; RTPS 2.5 §8.2.7.1 (Writer::new_change).
 
@@ -142,6 +147,7 @@ class StatefulWriter:
             key_hash=key_hash,
             destination=destination,
             related=related,
+            coherence=coherence,
         )
         change.fragment_octets = self.fragment_octets
         cache.add(change)
@@ -153,6 +159,24 @@ class StatefulWriter:
         if self._reliable_readers:
             self.heartbeat.written(now)
         return change
+
+    def end_coherent_set(self, coherence: Coherence, source_timestamp: int, now: float) -> CacheChange:
+        """Add what is no sample: the end of this writer's part in a coherent set.  RTPS 2.5 §8.7.6.
+
+        It belongs to no instance, so neither HISTORY, nor DEADLINE, nor LIFESPAN apply to it.
+        """
+        number = self.cache.last_sn + 1
+        change = CacheChange(ChangeKind.ALIVE, self.guid, number, b"", b"", source_timestamp, coherence=coherence)
+        change.fragment_octets = self.fragment_octets
+        self.cache.add(change)
+        if self._reliable_readers:
+            self.heartbeat.written(now)
+        return change
+
+    def withdraw(self, change: CacheChange) -> None:
+        """Forget a change that was just added, before anybody was sent it: its number stays empty."""
+        assert change.sequence_number >= self.next_unsent_sn
+        self.cache.remove(change.sequence_number)
 
     def _expected(self, kind: ChangeKind, key: bytes, now: float) -> None:
         """The next sample of the instance is expected within the DEADLINE; after its end none is."""
@@ -169,7 +193,7 @@ class StatefulWriter:
         """
         sequence_number = change.sequence_number
         size = len(change.payload)
-        if self.next_unsent_sn != sequence_number or size > self.fragment_octets:
+        if self.next_unsent_sn != sequence_number or size > self.fragment_octets or self.is_suspended:
             return False
         if self._reliable_readers:
             if self._in_flight_octets >= self.window.octets:
@@ -268,7 +292,7 @@ class StatefulWriter:
         RTPS 2.5 §8.4.7.5.4 (next_unsent_change), for all readers at once.
         """
         out: list[WriterTransmission] = []
-        while self.next_unsent_sn <= self.cache.last_sn:
+        while self.next_unsent_sn <= self.cache.last_sn and not self.is_suspended:
             change = self.cache.get(self.next_unsent_sn)
             if change is None or not self.readers:
                 self._advance_unsent()
@@ -351,7 +375,7 @@ class StatefulWriter:
         """Somebody waits for acknowledgment: ask all that lack something (final flag clear)."""
         return self._heartbeats_for(self._lagging_readers())
 
-    def assert_liveliness(self) -> list[WriterTransmission]:
+    def assert_liveliness(self) -> list[SendHeartbeat]:
         """A HEARTBEAT with the liveliness flag to all readers.  RTPS 2.5 §8.4.13.5."""
         if not self.readers or not self.is_reliable:
             return []
@@ -411,6 +435,9 @@ class StatefulWriter:
             out.extend(self._heartbeats_for(asked))
             for proxy in asked:
                 proxy.asked(now)
+            if self.has_group_news:
+                self.has_group_news = False
+                out.extend(replace(heartbeat, liveliness=False) for heartbeat in self.assert_liveliness())
             if asked:
                 self.heartbeat.sent(now)
             elif lagging:
@@ -553,7 +580,8 @@ class StatefulWriter:
         self._drain_in_flight()
         # What was not sent yet is lacked by all: a local reader takes a change before it leaves for the others.
         all_sent = self.next_unsent_sn > self.cache.last_sn
-        self.heartbeat.progress(now, complete=all_sent and not self._has_lagging_readers())
+        is_complete = all_sent and not self._has_lagging_readers() and not self.has_group_news
+        self.heartbeat.progress(now, complete=is_complete)
 
     def _free_acknowledged(self, proxy: ReaderProxy) -> None:
         """This reader has more than before, or is gone."""

@@ -29,6 +29,8 @@ class WriterHistoryCache:
         "_max_instances",
         "_max_per_instance",
         "_max_samples",
+        "_set_ends",
+        "_set_sizes",
         "keeps_instances",
         "last_sn",
         "octets",
@@ -46,6 +48,9 @@ class WriterHistoryCache:
         self._max_per_instance = per_instance if per_instance != LENGTH_UNLIMITED else 0
         self._keeps_acknowledged = qos.is_transient_local
         self.keeps_instances = bool(self._depth or self._max_instances or self._max_per_instance)
+        # How many members of each coherent set are here, by the number of its first; and the number that ends it.
+        self._set_sizes: dict[int, int] = {}
+        self._set_ends: dict[int, int] = {}
         self._first_sn = 1
         self._acked_sn = 0
         self.last_sn = 0
@@ -112,7 +117,9 @@ class WriterHistoryCache:
         size = len(change.payload)
         self.octets += size
         self.unacknowledged_octets += size
-        if not self.keeps_instances:
+        if change.coherence is not None:
+            self._enter_set(change)
+        if not self.keeps_instances or change.is_end_of_set:
             return None
         instance = self._by_instance.get(change.key)
         if instance is None:
@@ -125,7 +132,7 @@ class WriterHistoryCache:
         change = self._changes.get(sequence_number)
         if change is None:
             return None
-        instance = self._by_instance.get(change.key)
+        instance = self._by_instance.get(change.key) if not change.is_end_of_set else None
         if instance is not None:
             instance.remove(sequence_number)
             if not instance:
@@ -143,7 +150,7 @@ class WriterHistoryCache:
             change = self._changes.get(number)
             if change is None:
                 continue
-            if self._keeps_acknowledged:
+            if self._keeps_acknowledged and not self._is_idle_end(change):
                 self.unacknowledged_octets -= len(change.payload)
             else:
                 self.remove(number)
@@ -161,3 +168,35 @@ class WriterHistoryCache:
         self.octets -= size
         if change.sequence_number > self._acked_sn:
             self.unacknowledged_octets -= size
+        if change.coherence is not None:
+            self._leave_set(change)
+
+    # --- coherent sets -----------------------------------------------------------------------------------
+
+    def _enter_set(self, change: CacheChange) -> None:
+        assert change.coherence is not None
+        set_sn = change.coherence.set_sn
+        if change.coherence.is_end:
+            self._set_ends[set_sn] = change.sequence_number
+        elif set_sn:
+            self._set_sizes[set_sn] = self._set_sizes.get(set_sn, 0) + 1
+
+    def _is_idle_end(self, change: CacheChange) -> bool:
+        """Does it end a set of which nothing is here?  No late joiner needs that."""
+        return change.is_end_of_set and change.coherence is not None and change.coherence.set_sn not in self._set_sizes
+
+    def _leave_set(self, change: CacheChange) -> None:
+        """With the last member of a set goes its end, once all have it: ends must not pile up behind KEEP_LAST."""
+        assert change.coherence is not None
+        set_sn = change.coherence.set_sn
+        if change.coherence.is_end:
+            if self._set_ends.get(set_sn) == change.sequence_number:
+                del self._set_ends[set_sn]
+            return
+        if not set_sn:
+            return
+        self._set_sizes[set_sn] -= 1
+        if not self._set_sizes[set_sn]:
+            del self._set_sizes[set_sn]
+            if self._set_ends.get(set_sn, self._acked_sn + 1) <= self._acked_sn:
+                self.remove(self._set_ends[set_sn])

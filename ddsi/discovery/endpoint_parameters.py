@@ -16,7 +16,7 @@ from ..structure.discovered import (
     DiscoveredWriterData,
 )
 from ..structure.errors import MalformedMessage
-from ..structure.guid import Guid
+from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from ..structure.vendor import PROTOCOL_VERSION, VendorId
 from .parameter_values import ParameterValues, ParameterWriter, open_payload, seal_payload
@@ -70,6 +70,8 @@ def _write_identity(out: ParameterWriter, data: DiscoveredEndpointData) -> None:
 def _write_rest(out: ParameterWriter, data: DiscoveredEndpointData) -> None:
     out.locators(_PID.UNICAST_LOCATOR, data.unicast)
     out.locators(_PID.MULTICAST_LOCATOR, data.multicast)
+    if data.group_entity_id != EntityId.UNKNOWN:
+        out.octets(_PID.GROUP_ENTITYID, data.group_entity_id)
     if data.type_information:
         out.octets(_PID.TYPE_INFORMATION, data.type_information)
     out.security_parameters(data.security_parameters)
@@ -114,6 +116,7 @@ class _Common(NamedTuple):
     vendor_id: VendorId
     unicast: tuple[Locator, ...]
     multicast: tuple[Locator, ...]
+    group_entity_id: EntityId
     type_information: bytes
     security_parameters: tuple[tuple[int, bytes], ...]
 
@@ -137,9 +140,16 @@ def _read_common(values: ParameterValues, vendor_id: VendorId) -> _Common:
         vendor_id=values.read(_PID.VENDORID, lambda reader: bytes(reader.octets(2)), vendor_id),
         unicast=values.locators(_PID.UNICAST_LOCATOR, multicast=False),
         multicast=values.locators(_PID.MULTICAST_LOCATOR, multicast=True),
+        group_entity_id=_read_group(values),
         type_information=_read_type_information(values),
         security_parameters=values.security_parameters(),
     )
+
+
+def _read_group(values: ParameterValues) -> EntityId:
+    """By its entity id, or by its whole Guid, of which nothing but that can be news."""
+    group = values.read(_PID.GROUP_GUID, Reader.guid, None)
+    return values.read(_PID.GROUP_ENTITYID, Reader.entity_id, group.entity_id if group else EntityId.UNKNOWN)
 
 
 def _read_name(reader: Reader) -> str:

@@ -31,6 +31,7 @@ class Timer(Enum):
     LEASE = "a remote participant has been silent for its lease"
     WRITER = "a writer's heartbeat, pace, lifespan or deadline"
     READER = "a reader's lifespan or deadline"
+    SUBSCRIBER = "a subscriber has waited long enough for what comes first in its order"
     ACKNACK = "a reader's answer to one writer"
     ASSERTION = "assert automatic liveliness"
     WRITER_LIVELINESS = "a local manual writer was not asserted"
@@ -92,6 +93,9 @@ class Alarms:
     def reader(self, guid: Guid, deadline: float) -> None:
         self._timers.set((Timer.READER, guid), deadline)
 
+    def subscriber(self, guid: Guid, deadline: float) -> None:
+        self._timers.set((Timer.SUBSCRIBER, guid), deadline)
+
     def answer(self, reader: Guid, writer: Guid, deadline: float) -> None:
         self._timers.set((Timer.ACKNACK, reader, writer), deadline)
 
@@ -117,6 +121,9 @@ class Alarms:
         for timer in (Timer.WRITER, Timer.LINGER, Timer.WRITER_LIVELINESS):
             self._timers.cancel((timer, guid))
 
+    def forget_subscriber(self, guid: Guid) -> None:
+        self._timers.cancel((Timer.SUBSCRIBER, guid))
+
     def forget_reader(self, guid: Guid) -> None:
         self._timers.cancel((Timer.READER, guid))
 
@@ -136,6 +143,8 @@ class Alarms:
                 engine.answer_writer(subjects[0], subjects[1], now)
             case Timer.READER:
                 engine.timeliness.reader_due(subjects[0], now)
+            case Timer.SUBSCRIBER:
+                engine.presentation.subscriber_due(subjects[0], now)
             case Timer.ASSERTION:
                 engine.liveliness.assert_automatic(now)
                 self.assertion(now + engine.liveliness.assertion_period())

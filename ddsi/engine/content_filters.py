@@ -5,6 +5,7 @@ RTPS 2.5 §8.7.3: it may, where it understands the filter; a reader filters in a
 - the filter is none of SQL, or does not fit the writer's type: a stranger's expression is read with care, and what
   cannot be evaluated passes;
 - it evaluates many others already: each costs time with every sample;
+- the reader wants coherent sets whole: what it is not sent could as well be lost;
 - its payloads are protected: whether a datagram leaves would show everybody what only their readers may know.
 """
 
@@ -30,7 +31,7 @@ def writer_side_filter(writer: LocalWriter, data: DiscoveredReaderData, hooks: S
         return None
     if announced.filter_class_name != SQL_FILTER_CLASS or announced.related_topic_name != writer.data.topic_name:
         return None
-    if hooks.overhead(writer.guid, ()).payload:
+    if data.qos.presentation.coherent_access or hooks.overhead(writer.guid, ()).payload:
         return None
     filters = {known.signature: known for proxy in behavior.filtering_readers if (known := proxy.content_filter)}
     signature, _ = filter_signatures(announced)

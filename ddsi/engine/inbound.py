@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..behavior.defrag import PartialSample
@@ -28,7 +29,8 @@ from ..serialization.parameter_id import ParameterId
 from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
 from ..spi import NoKeys, NotForUs, Octets, Outcome, Protection, Rejected
 from ..structure.builtin_entity_ids import SPDP_WRITER
-from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.cache_change import CacheChange, ChangeKind, StatusInfo
+from ..structure.coherence import Coherence
 from ..structure.errors import MalformedMessage, MalformedSample
 from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
@@ -44,6 +46,8 @@ __all__ = ["Inbound", "Incoming"]
 _DATA = int(SubmessageKind.DATA)
 _INFO_TS = int(SubmessageKind.INFO_TS)
 _TIMESTAMP = struct.Struct("<II")
+_NUMBER = {True: struct.Struct("<iI"), False: struct.Struct(">iI")}
+_COHERENCE = (ParameterId.COHERENT_SET, ParameterId.GROUP_SEQ_NUM, ParameterId.GROUP_COHERENT_SET)
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
 _LE_DATA_AND_QOS = 0x07
 _SEC_PREFIX = int(SubmessageKind.SEC_PREFIX)
@@ -358,8 +362,9 @@ class Inbound:
     ) -> None:
         """A whole change with what stood beside it: which end of an instance, if any, is it?"""
         kind = ChangeKind(inline.status & 3) if is_key or not len(payload) else ChangeKind.ALIVE
-        if kind is ChangeKind.ALIVE and (is_key or not len(payload)):
-            self._nothing(incoming, remote, reader_id, number)
+        coherence = inline.coherence_of(has_sample=bool(is_key or len(payload) or kind))
+        if kind is ChangeKind.ALIVE and (is_key or not len(payload)) and not (coherence and coherence.is_end):
+            self._nothing(incoming, remote, reader_id, number, is_filtered=bool(inline.status & StatusInfo.FILTERED))
             return
         timestamp = incoming.timestamp
         change = CacheChange(
@@ -371,16 +376,23 @@ class Inbound:
             timestamp if timestamp is not None else self._engine.wall_ticks(),
             key_hash=inline.key_hash,
             related=inline.related,
+            coherence=coherence,
         )
         change.verdicts = inline.verdicts
         self._change(incoming, remote, reader_id, change)
 
-    def _nothing(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, number: int) -> None:
-        """A change that says nothing to us: filtered out by the writer, or a marker.  Its number counts as received."""
+    def _nothing(
+        self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, number: int, *, is_filtered: bool = False
+    ) -> None:
+        """A change that says nothing to us: filtered out by the writer, say.  Its number counts as received."""
         for reader, proxy in remote.readers:
             if reader_id in (_UNKNOWN_ID, reader.guid[12:]):
+                local = self._engine.local_readers[reader.guid]
+                if is_filtered and local.sets is not None:
+                    local.sets.filtered(proxy.guid, number, number + 1)
                 reader.receive_gap(proxy, number, NumberSet(number + 1), incoming.now)
                 self._engine.proxy_touched(reader, proxy)
+                self._engine.presentation.gap(local, proxy, incoming.now)
 
     def _change(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, change: CacheChange) -> None:
         """To every matched reader that it is addressed to."""
@@ -391,7 +403,11 @@ class Inbound:
             if reader_id != _UNKNOWN_ID and reader_id != reader.guid[12:]:
                 continue
             local = self._engine.local_readers[reader.guid]
-            if local.keys is not None:
+            if change.is_end_of_set:
+                if local.sets is None:
+                    self._nothing(incoming, remote, reader.guid[12:], change.sequence_number)
+                    continue
+            elif local.keys is not None:
                 try:
                     key = local.key_of(change)
                 except MalformedSample as error:
@@ -580,6 +596,7 @@ class Inbound:
                 self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
             if proxy.schedule.due != due:
                 self._engine.proxy_touched(local.behavior, proxy)
+            self._engine.presentation.heartbeat(local, proxy, heartbeat, incoming.now)
             restarted = restarted or proxy.contradictions >= _CONTRADICTIONS_OF_A_RESTART
         self._forget_settled(incoming, heartbeat.writer_id)
         # A participant that may not say in clear that it changed does not begin anew by its numbers: HEARTBEATs of the
@@ -609,8 +626,11 @@ class Inbound:
         if not self._may_ask(incoming, gap.gap_list.bitmap.bit_count()):
             return
         for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
+            if local.sets is not None and gap.filtered_count:
+                local.sets.gap_received(proxy.guid, gap.gap_start, gap.gap_list, gap.filtered_count)
             local.behavior.receive_gap(proxy, gap.gap_start, gap.gap_list, incoming.now)
             self._engine.proxy_touched(local.behavior, proxy)
+            self._engine.presentation.gap(local, proxy, incoming.now)
         self._forget_settled(incoming, gap.writer_id)
 
     def _forget_settled(self, incoming: Incoming, writer_id: bytes) -> None:
@@ -675,10 +695,11 @@ def _check_number(number: int, raw: RawSubmessage) -> None:
 class _InlineQos:
     """What a DATA's inline QoS says that concerns receiving it.  RTPS 2.5 §8.7, §9.6.4."""
 
-    __slots__ = ("key_hash", "related", "status", "verdicts")
+    __slots__ = ("coherence", "key_hash", "related", "status", "verdicts")
 
     def __init__(self, status: int = 0, key_hash: bytes = b"", related: tuple[Guid, int] | None = None) -> None:
         self.status = status
+        self.coherence: Coherence | None = None
         self.key_hash = key_hash
         self.related = related
         self.verdicts: dict[bytes, bool] | None = None  # what content filters say, by their signatures
@@ -698,7 +719,33 @@ class _InlineQos:
         filter_info = parameters.get(ParameterId.CONTENT_FILTER_INFO)
         if filter_info is not None:
             inline.verdicts = decode_content_filter_info(filter_info, little_endian=parameters.little_endian)
+        inline.coherence = _coherence(parameters)
         return inline
+
+    def coherence_of(self, *, has_sample: bool) -> Coherence | None:
+        """What speaks of a coherent set, and stands with no sample, is the end of one; whatever number it bears."""
+        coherence = self.coherence
+        if coherence is None or has_sample or self.status & StatusInfo.FILTERED:
+            return coherence
+        return replace(coherence, is_end=True)
+
+
+def _coherence(parameters: ParameterList) -> Coherence | None:
+    """Its place in a set and in its publisher, if it says so.  RTPS 2.5 §8.7.5, §8.7.6, §9.6.4."""
+    if not any(parameters.get(parameter) is not None for parameter in _COHERENCE):
+        return None
+    set_sn, group_sn, group_set_sn = (_sequence_number(parameters, parameter) for parameter in _COHERENCE)
+    return Coherence(set_sn, group_sn, group_set_sn)
+
+
+def _sequence_number(parameters: ParameterList, parameter: ParameterId) -> int:
+    """0 where it is not there, or cannot be."""
+    value = parameters.get(parameter)
+    if value is None or len(value) < 8:
+        return 0
+    high, low = _NUMBER[parameters.little_endian].unpack_from(value)
+    number: int = high << 32 | low
+    return number if 0 < number < _NUMBERS_END else 0
 
 
 _NO_INLINE_QOS = _InlineQos()

@@ -9,10 +9,14 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import ClassVar
 
+from ..behavior.coherent_sets import CoherentSets
 from ..behavior.content_filter import CompileFilter
+from ..behavior.publisher_group import PublisherGroup
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
+from ..behavior.subscriber_group import SubscriberGroup
+from ..messages.heartbeat import HeartbeatGroupInfo
 from ..messages.packer import MessagePacker
 from ..spi import ProtectedEndpoint
 from ..structure.cache_change import CacheChange, ChangeKind
@@ -73,6 +77,7 @@ class LocalWriter:
         "compile_filter",
         "data",
         "deadline",
+        "group",
         "guid",
         "has_fresh_samples",
         "has_lost_liveliness",
@@ -93,6 +98,7 @@ class LocalWriter:
         self.guid: Guid = data.guid
         self.behavior = behavior
         self.packer = packer
+        self.group: PublisherGroup | None = None  # that of its publisher
         self.has_fresh_samples = False  # were any packed since the last piggybacked HEARTBEAT?
         self.protection = ProtectedEndpoint()
         self.receivers: tuple[Guid, ...] = ()
@@ -107,6 +113,29 @@ class LocalWriter:
         self.has_lost_liveliness = False
         self.wants_acknowledgment = 0  # how many wait for its progress
         self.compile_filter: CompileFilter | None = None  # without it no reader's content filter is evaluated
+
+    def group_info(self, first_sn: int, last_sn: int) -> HeartbeatGroupInfo | None:
+        """What a HEARTBEAT over these numbers says of the publisher, where its order matters.  RTPS 2.5 §8.3.8.6.
+
+        Of this writer: up to ``current_gsn`` it has nothing but what the HEARTBEAT announces.
+        """
+        group, behavior = self.group, self.behavior
+        if group is None or not group.is_numbered(self.guid):
+            return None
+        current_gsn = group.group_sn
+        for number in range(behavior.next_unsent_sn, behavior.cache.last_sn + 1):
+            unsent = behavior.cache.get(number)
+            if unsent is not None and unsent.coherence is not None:
+                current_gsn = unsent.coherence.group_sn - 1
+                break
+        first, last = behavior.cache.get(first_sn), behavior.cache.get(last_sn)
+        return HeartbeatGroupInfo(
+            current_gsn,
+            first.coherence.group_sn if first is not None and first.coherence is not None else current_gsn + 1,
+            last.coherence.group_sn if last is not None and last.coherence is not None else current_gsn,
+            group.writer_set,
+            bytes(4),
+        )
 
     def match_changed(self, reader: Guid, change: int) -> Status:
         """One matched reader more (+1) or less (-1)."""
@@ -156,6 +185,8 @@ class LocalReader:
     keys: KeyCodec | None
     guid: Guid = field(init=False)
     uses_filter: bool = False
+    sets: CoherentSets | None = None  # what stands before the history, where the reader asks for more than samples
+    subscriber: SubscriberGroup | None = None  # that of its subscriber, where access scope is GROUP
     protection: ProtectedEndpoint = ProtectedEndpoint()
     matched: SubscriptionMatched = SubscriptionMatched()
     incompatible: RequestedIncompatibleQos = RequestedIncompatibleQos()

@@ -209,6 +209,7 @@ class Matchmaker:
         participant = engine.participants[data.guid[:12]]
         self.attach_writer(reader, data, participant, participant.user_traffic(data.unicast), now)
         _tell_history(reader, data)
+        engine.presentation.writer_matched(reader, data)
         self._note_matched(reader.guid, data.guid, data.topic_name)
         engine.status(reader.guid, reader.match_changed(data.guid, 1))
         engine.status(reader.guid, reader.liveliness_changed(data.guid, alive=1, not_alive=0))
@@ -243,13 +244,14 @@ class Matchmaker:
         reader_proxy = writer.behavior.matched_local_reader_add(reader.data, now)
         writer_proxy = reader.behavior.matched_writer_add(writer.data, (), now, is_local=True)
         _tell_history(reader, writer.data)
+        engine.presentation.writer_matched(reader, writer.data)
         writer_proxy.reorder.next_sn = reader_proxy.history_sn + 1
         writer_proxy.last_seq = reader_proxy.history_sn
         self._note_matched(writer.guid, reader.guid, writer.data.topic_name)
         engine.status(writer.guid, writer.match_changed(reader.guid, 1))
         engine.status(reader.guid, reader.match_changed(writer.guid, 1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=1, not_alive=0))
-        engine.deliver_locally(writer, reader, now)
+        engine.local_delivery.deliver(writer, reader, now)
 
     # --- the end of a pair -------------------------------------------------------------------------------
 
@@ -269,6 +271,7 @@ class Matchmaker:
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_unmatched(guid, now)
+            engine.presentation.writer_unmatched(reader, guid, now)
         engine.status(reader.guid, reader.match_changed(guid, -1))
         alive = proxy is None or proxy.is_alive
         engine.status(
@@ -300,6 +303,7 @@ class Matchmaker:
         self._engine.recorder.unmatched(writer.guid, reader.guid, writer.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_unmatched(writer.guid, now)
+            engine.presentation.writer_unmatched(reader, writer.guid, now)
         engine.status(writer.guid, writer.match_changed(reader.guid, -1))
         engine.status(reader.guid, reader.match_changed(writer.guid, -1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-int(alive), not_alive=int(alive) - 1))

@@ -35,6 +35,7 @@ from ..serialization.parameter_id import ParameterId
 from ..serialization.parameter_list import ParameterList
 from ..spi import Octets, Overhead, Parts, SecurityHooks
 from ..structure.cache_change import CacheChange, ChangeKind
+from ..structure.coherence import SEQUENCE_NUMBER_UNKNOWN, Coherence
 from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from .effects import SendDatagram
@@ -109,7 +110,7 @@ class Outbound:
         behavior = writer.behavior
         if not behavior.locators:
             return
-        if change.kind is not ChangeKind.ALIVE or change.related is not None:
+        if change.kind is not ChangeKind.ALIVE or change.related is not None or change.coherence is not None:
             self._send_data(writer, change, None)
             return
         payload = self._hooks.encode_payload(writer.guid, change.payload)
@@ -192,7 +193,14 @@ class Outbound:
         for reader in item.readers if item.readers is not None else (None,):
             reader_id = reader.entity_id if reader is not None and len(item.readers or ()) == 1 else EntityId.UNKNOWN
             heartbeat = Heartbeat(
-                reader_id, writer.guid.entity_id, item.first, item.last, item.count, item.final, item.liveliness
+                reader_id,
+                writer.guid.entity_id,
+                item.first,
+                item.last,
+                item.count,
+                item.final,
+                item.liveliness,
+                writer.group_info(item.first, item.last),
             )
             self._append(writer, reader, heartbeat.encode(), None)
 
@@ -286,6 +294,9 @@ class Outbound:
         item = writer.behavior.piggyback_heartbeat()
         if item is None:
             return
+        if writer.group is not None:
+            self._send_heartbeat(writer, item)
+            return
         octets = fast.heartbeat(_UNKNOWN_ID, writer.guid[12:], item.first, item.last, item.count, final=item.final)
         parts = self._hooks.encode_submessage(writer.guid, writer.receivers, (octets,))
         if not parts:
@@ -324,7 +335,9 @@ def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterLis
     content filter was evaluated here need not do it again.
     """
     content_filter = reader.content_filter if reader is not None and change.kind is ChangeKind.ALIVE else None
-    if change.kind is ChangeKind.ALIVE and change.related is None and not change.key_hash and content_filter is None:
+    coherence = change.coherence
+    is_plain = change.related is None and not change.key_hash and content_filter is None and coherence is None
+    if change.kind is ChangeKind.ALIVE and is_plain:
         return None
     parameters = ParameterList(little_endian=True)
     if content_filter is not None:
@@ -336,8 +349,26 @@ def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterLis
         parameters.add(ParameterId.STATUS_INFO, bytes((0, 0, 0, change.kind)))
     if change.related is not None:
         guid, number = change.related
-        identity = (
-            guid + (number >> 32).to_bytes(4, "little", signed=True) + (number & 0xFFFFFFFF).to_bytes(4, "little")
-        )
-        parameters.add(ParameterId.RELATED_SAMPLE_IDENTITY, identity)
+        parameters.add(ParameterId.RELATED_SAMPLE_IDENTITY, guid + _number(number))
+    if coherence is not None:
+        _add_coherence(parameters, coherence)
     return parameters
+
+
+def _add_coherence(parameters: ParameterList, coherence: Coherence) -> None:
+    """RTPS 2.5 §8.7.5, §8.7.6: what ends a set belongs to none of its writer's."""
+    if coherence.is_end:
+        parameters.add(ParameterId.COHERENT_SET, _number(SEQUENCE_NUMBER_UNKNOWN))
+    elif coherence.set_sn:
+        parameters.add(ParameterId.COHERENT_SET, _number(coherence.set_sn))
+    if coherence.group_set_sn:
+        parameters.add(ParameterId.GROUP_COHERENT_SET, _number(coherence.group_set_sn))
+    if coherence.group_sn:
+        parameters.add(ParameterId.GROUP_SEQ_NUM, _number(coherence.group_sn))
+    if coherence.writer_set:
+        parameters.add(ParameterId.WRITER_GROUP_INFO, coherence.writer_set)
+
+
+def _number(number: int) -> bytes:
+    """SequenceNumber: high, then low."""
+    return (number >> 32).to_bytes(4, "little", signed=True) + (number & 0xFFFFFFFF).to_bytes(4, "little")

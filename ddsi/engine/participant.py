@@ -24,9 +24,11 @@ from ..behavior.content_filter import CompileFilter, ContentFilter, Evaluate
 from ..behavior.content_filtering_writer import ContentFilteringWriter
 from ..behavior.defrag import DefragBudget
 from ..behavior.filtering_writer import FilteringWriter
+from ..behavior.publisher_group import PublisherGroup
 from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..behavior.stateful_reader import ChangeSink, RemoteWriter, StatefulReader
 from ..behavior.stateful_writer import StatefulWriter
+from ..behavior.subscriber_group import SubscriberGroup
 from ..behavior.transmissions import WriterTransmission
 from ..behavior.writer_proxy import WriterProxy
 from ..config import Config
@@ -71,9 +73,11 @@ from .discovery_agent import DiscoveryAgent
 from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
 from .inbound import Inbound
 from .liveliness import Liveliness
+from .local_delivery import LocalDelivery
 from .local_endpoints import KeyCodec, LocalReader, LocalWriter
 from .matchmaker import Matchmaker
 from .outbound import Outbound, fragment_octets_for
+from .presentation import Presentation, announced_group
 from .qos_changes import QosChanges
 from .recorder import Recorder
 from .timeliness import Timeliness
@@ -173,6 +177,8 @@ class Participant:
         self.qos_changes = QosChanges(self)
         self.liveliness = Liveliness(self)
         self.timeliness = Timeliness(self)
+        self.presentation = Presentation(self)
+        self.local_delivery = LocalDelivery(self)
         self.admission = AdmissionDesk(self)
         self.builtin_readers = BuiltinTopicReaders(self)
         self.types = TypeLookup(self)
@@ -288,6 +294,7 @@ class Participant:
         compile_filter: CompileFilter | None = None,  # evaluates content filters, to spare readers what they would drop
         filters: bool = False,
         type_information: bytes = b"",
+        group: PublisherGroup | None = None,
     ) -> LocalWriter:
         """Create, announce and match a writer.  Raises NotAllowedBySecurity, and nothing has changed then."""
         self.now = now
@@ -296,11 +303,15 @@ class Participant:
             guid=self.new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
             vendor_id=self.config.vendor_id, type_information=type_information,
         )  # fmt: skip
+        if group is not None:
+            data = replace(data, group_entity_id=announced_group(qos, group.entity_id))
         protection = self.hooks.local_writer(data)
         data = replace(data, security_parameters=protection.parameters)
         writer = self.add_writer(data, filters=filters)
         writer.compile_filter = compile_filter
         writer.protection = protection
+        if group is not None:
+            self.presentation.writer_created(writer, group)
         self._writers_by_topic.setdefault(topic_name, {})[writer.guid] = writer
         self.recorder.endpoint_created(data)
         self.discovery.announce_writer(writer, now)
@@ -320,6 +331,7 @@ class Participant:
         type_information: bytes = b"",
         content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
         uses_filter: bool = False,
+        group: SubscriberGroup | None = None,
     ) -> LocalReader:
         """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then.
 
@@ -334,6 +346,8 @@ class Participant:
         )  # fmt: skip
         if content_filter is not None:
             data = replace(data, content_filter=content_filter[0])
+        if group is not None:
+            data = replace(data, group_entity_id=announced_group(qos, group.guid.entity_id))
         protection = self.hooks.local_reader(data)
         data = replace(data, security_parameters=protection.parameters)
         guid = data.guid
@@ -348,7 +362,8 @@ class Participant:
             wall_time=lambda now: self._wall_clock() / 1e9,
         )
         reader = self.add_reader(data, history, keys)
-        reader.behavior.history = self.recorder.delivering(guid, history)
+        sink = self.recorder.delivering(guid, history)
+        reader.behavior.history = self.presentation.sink_for(reader, history, sink, group)
         reader.behavior.on_repeat = history.written_again
         reader.protection = protection
         reader.uses_filter = uses_filter or content_filter is not None
@@ -385,6 +400,7 @@ class Participant:
 
     def _finish_writer(self, writer: LocalWriter, now: float) -> None:
         self.matchmaker.writer_gone(writer, now)
+        self.presentation.writer_gone(writer)
         self.hooks.local_endpoint_deleted(writer.guid)
         self.discovery.announce_gone(writer, now)
         self.closing.discard(writer.guid)
@@ -403,6 +419,7 @@ class Participant:
         if reader.guid not in self.local_readers:
             return
         self.matchmaker.reader_gone(reader, now)
+        self.presentation.reader_gone(reader, now)
         self.hooks.local_endpoint_deleted(reader.guid)
         self.discovery.announce_gone(reader, now)
         del self.local_readers[reader.guid]
@@ -468,12 +485,18 @@ class Participant:
             key_hash=key_hash,
             destination=destination,
             related=related,
+            coherence=self.presentation.place(writer, now) if writer.group is not None else None,
         )
+        self.change_added(writer, change, now)
+        return change
+
+    def change_added(self, writer: LocalWriter, change: CacheChange, now: float) -> None:
+        """What is new in a writer's history goes on its way."""
+        behavior = writer.behavior
         if self.recorder.is_on:
             self.recorder.written(change)
-        if behavior.local_readers:
-            for guid in list(behavior.local_readers):
-                self.deliver_locally(writer, self.local_readers[guid], now)
+        if behavior.local_readers and not behavior.is_suspended:
+            self.local_delivery.written(writer, now)
         if behavior.sends_directly(change):
             self.outbound.send_change(writer, change)
         else:
@@ -485,7 +508,6 @@ class Participant:
             self.alarms.writer(writer, due)
         if not self.alarms.flush_is_set and not self.outbound.is_idle:
             self.alarms.flush(now + _FLUSH_AFTER_S)
-        return change
 
     def write_builtin(
         self, writer_id: EntityId, kind: ChangeKind, payload: bytes, key: bytes, now: float
@@ -494,37 +516,17 @@ class Participant:
         writer = self.local_writers[Guid.of(self.guid.prefix, writer_id)]
         return self.write(writer, kind, payload, key, now, key_hash=key if kind is not ChangeKind.ALIVE else b"")
 
-    def deliver_locally(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
-        """Hand a reader of this participant what the writer holds and it lacks, in order, as far as it has room.
-
-        There is no wire in between, so numbers that are not in the cache, or are for others, are simply stepped over.
-        """
-        writer_proxy = reader.behavior.writers[writer.guid]
-        reader_proxy = writer.behavior.local_readers[reader.guid]
-        cache = writer.behavior.cache
-        number = max(writer_proxy.next_sn, min(cache.first_sn, cache.last_sn + 1))
-        while number <= cache.last_sn:
-            change = cache.get(number)
-            if change is not None and reader_proxy.is_relevant(change):
-                if reader.keys is not None and not change.key:
-                    change.key = reader.key_of(change) or b""  # written when nobody here needed it
-                if not reader.behavior.history.add(change, now):
-                    break
-            number += 1
-        writer_proxy.reorder.next_sn = number
-        writer_proxy.last_seq = cache.last_sn
-        writer.behavior.local_reader_progress(reader_proxy, number - 1, now)
-
     def samples_taken(self, reader: LocalReader, now: float) -> None:
         """The application took samples: what waited for room goes on, and its writers are told."""
         self.now = now
+        self.presentation.samples_taken(reader, now)
+        self.resume(reader, now)
+
+    def resume(self, reader: LocalReader, now: float) -> None:
+        """There may be room for what a reader could not take."""
         for proxy in reader.behavior.resume(now):
             self.proxy_touched(reader.behavior, proxy)
-        for guid, proxy in reader.behavior.writers.items():
-            if proxy.is_local and proxy.next_sn <= proxy.last_seq:
-                writer = self.local_writers[guid]
-                self.deliver_locally(writer, reader, now)
-                self.writer_answers(writer, ())
+        self.local_delivery.resume(reader, now)
 
     def request_acknowledgment(self, writer: LocalWriter, now: float) -> None:
         """Somebody waits: ask all who lack something, now."""

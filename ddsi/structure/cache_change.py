@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum, IntFlag
 
+from .coherence import Coherence
 from .guid import GUID_UNKNOWN, Guid
 
 __all__ = ["CacheChange", "ChangeKind", "StatusInfo"]
@@ -37,10 +38,12 @@ class CacheChange:
     ``fragment_octets`` is how large its writer cuts the fragments of a change that is too large for one message; it
     stays so, whatever size newer changes get.  ``related`` is who and which sample this one answers:
     PID_RELATED_SAMPLE_IDENTITY's (Guid, number).  ``sealed`` is the payload as it was protected in one piece, for those
-    readers that join fragments first: all its fragments must be of one and the same protection.
+    readers that join fragments first: all its fragments must be of one and the same protection.  ``coherence`` is its
+    place in a coherent set and in its publisher's order, where it has one.
     """
 
     __slots__ = (
+        "coherence",
         "destination",
         "expiry",
         "fragment_octets",
@@ -69,6 +72,7 @@ class CacheChange:
         destination: Guid = GUID_UNKNOWN,
         related: tuple[Guid, int] | None = None,
         expiry: float = float("inf"),
+        coherence: Coherence | None = None,
     ) -> None:
         self.kind = kind
         self.writer_guid = writer_guid
@@ -80,10 +84,16 @@ class CacheChange:
         self.destination = destination
         self.related = related
         self.expiry = expiry
+        self.coherence = coherence
         self.fragment_octets = 0
         self.sealed: bytes | bytearray | memoryview | None = None
         # What content filters say of it, by their signatures: found out here, or told by its writer.
         self.verdicts: dict[bytes, bool] | None = None
+
+    @property
+    def is_end_of_set(self) -> bool:
+        """Is it no sample, but the end of its writer's part in a coherent set?"""
+        return self.coherence is not None and self.coherence.is_end
 
     def __repr__(self) -> str:
         return f"<CacheChange {self.kind.name} {self.writer_guid}#{self.sequence_number}, {len(self.payload)} octets>"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from .builtin_entity_ids import BuiltinEndpoints
 from .dataclass import dataclass
-from .guid import Guid
+from .guid import EntityId, Guid
 from .locator import Locator
 from .qos import EndpointQos
 from .qos_policies import BinaryProperty, Property
@@ -62,7 +62,10 @@ class ContentFilterProperty:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiscoveredEndpointData:
-    """What writers and readers announce alike.  Empty locator lists: those of the participant hold."""
+    """What writers and readers announce alike.  Empty locator lists: those of the participant hold.
+
+    ``group_entity_id``: the publisher or subscriber that it belongs to, where that matters (PID_GROUP_ENTITYID).
+    """
 
     guid: Guid
     topic_name: str
@@ -71,6 +74,7 @@ class DiscoveredEndpointData:
     vendor_id: VendorId = OUR_VENDOR_ID
     unicast: tuple[Locator, ...] = ()
     multicast: tuple[Locator, ...] = ()
+    group_entity_id: EntityId = EntityId.UNKNOWN
     type_information: bytes = b""
     security_parameters: tuple[Parameter, ...] = ()
 

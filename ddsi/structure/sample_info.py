@@ -60,6 +60,7 @@ class SampleInfo:
         "_change",
         "_reception_seconds",
         "absolute_generation_rank",
+        "arrival",
         "disposed_generation_count",
         "generation_rank",
         "instance_handle",
@@ -86,6 +87,7 @@ class SampleInfo:
         self.disposed_generation_count = 0
         self.no_writers_generation_count = 0
         self.sample_rank = 0
+        self.arrival = 0  # its place among the samples of all readers of a subscriber with group order
         self.generation_rank = 0
         self.absolute_generation_rank = 0
 

@@ -127,6 +127,8 @@ class SampleLossReason(StrEnum):
     """Fragments were given up: too old, or the table was full."""
     WRITER_LOST = "writer_lost"
     """The writer went before they could be repaired."""
+    INCOMPLETE_SET = "incomplete_set"
+    """They came, but not all of their coherent set did, or there was no room for it."""
     REJECTED_BY_SECURITY = "rejected_by_security"
 
 

@@ -9,11 +9,21 @@ from hypothesis import strategies as st
 from ddsi.behavior.reader_history_cache import ReaderHistoryCache
 from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.qos import Qos, reader_qos
-from ddsi.structure.qos_policies import BestEffort, KeepAll, KeepLast, Reliable, ResourceLimits
+from ddsi.structure.qos_policies import (
+    AccessScope,
+    BestEffort,
+    KeepAll,
+    KeepLast,
+    Presentation,
+    Reliable,
+    ResourceLimits,
+)
 from ddsi.structure.sample_info import InstanceState, SampleInfo, SampleState, ViewState
 from tests.behavior.builders import change, guid
 
 KEEP_ALL = Qos(history=KeepAll(), reliability=Reliable())
+TOPIC = AccessScope.TOPIC
+ORDERED = Qos(presentation=Presentation(TOPIC, ordered_access=True))
 W1, W2 = guid(1), guid(2)
 DISPOSE, UNREGISTER = ChangeKind.NOT_ALIVE_DISPOSED, ChangeKind.NOT_ALIVE_UNREGISTERED
 BOTH = ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED
@@ -56,12 +66,28 @@ def states(taken: list[tuple[SampleInfo, CacheChange]]) -> list[tuple[bool, Inst
 # --- taking and reading ---------------------------------------------------------------------------------------------
 
 
-def test_samples_leave_in_the_order_of_arrival() -> None:
-    cache = Cache()
+def test_samples_leave_by_instance_and_within_each_in_the_order_of_arrival() -> None:
+    """DDS 1.4 §2.2.2.5.3.8, for access scope INSTANCE, and wherever order was not asked for."""
+    for presentation in (Presentation(), Presentation(AccessScope.INSTANCE, False, True), Presentation(TOPIC, True)):
+        cache = Cache(KEEP_ALL | Qos(presentation=presentation))
+        for key in (b"a", b"b", b"a"):
+            cache.put(key)
+        assert numbers(cache.take()) == [1, 3, 2]
+        assert (len(cache), cache.octets) == (0, 0)
+
+
+def test_with_ordered_access_to_the_topic_samples_leave_in_the_order_of_arrival() -> None:
+    cache = Cache(KEEP_ALL | ORDERED)
     for key in (b"a", b"b", b"a"):
         cache.put(key)
-    assert numbers(cache.take()) == [1, 2, 3]
-    assert (len(cache), cache.octets) == (0, 0)
+    assert numbers(cache.read()) == numbers(cache.take()) == [1, 2, 3]
+
+
+def test_at_most_so_many_are_the_ones_that_came_first() -> None:
+    cache = Cache()
+    for key in (b"a", b"b", b"a", b"b"):
+        cache.put(key)
+    assert numbers(cache.take(3)) == [1, 3, 2]
 
 
 def test_reading_leaves_them_and_marks_them_read() -> None:
@@ -217,7 +243,24 @@ def test_ranks_count_within_each_instance() -> None:
     cache = Cache()
     for key in (b"a", b"b", b"a", b"a", b"b"):
         cache.put(key)
+    assert [info.sample_rank for info, _ in cache.take()] == [2, 1, 0, 1, 0]
+
+
+def test_ranks_count_within_each_instance_where_instances_are_mixed() -> None:
+    cache = Cache(KEEP_ALL | ORDERED)
+    for key in (b"a", b"b", b"a", b"a", b"b"):
+        cache.put(key)
     assert [info.sample_rank for info, _ in cache.take()] == [2, 1, 1, 0, 0]
+
+
+def test_generations_count_within_each_instance_where_instances_are_mixed() -> None:
+    cache = Cache(KEEP_ALL | ORDERED)
+    for key, kind in ((b"a", None), (b"b", None), (b"a", DISPOSE), (b"b", None), (b"a", None)):
+        cache.put(key, kind if kind is not None else ChangeKind.ALIVE)
+    infos = [info for info, _ in cache.take()]
+    assert [info.disposed_generation_count for info in infos] == [0, 0, 0, 0, 1]
+    assert [info.generation_rank for info in infos] == [1, 0, 1, 0, 0]
+    assert [info.absolute_generation_rank for info in infos] == [1, 0, 1, 0, 0]
 
 
 def test_instances_come_and_go_without_end() -> None:
@@ -249,7 +292,7 @@ def test_keep_last_replaces_the_oldest_of_the_instance() -> None:
     cache = Cache(Qos(history=KeepLast(2)))
     for key in (b"a", b"a", b"b", b"a"):
         cache.put(key)
-    assert numbers(cache.take()) == [2, 3, 4]
+    assert sorted(numbers(cache.take())) == [2, 3, 4]
 
 
 @pytest.mark.parametrize("depth", [1, 2, 5])

@@ -183,9 +183,9 @@ async def test_ranks_and_counts_tell_the_place_among_the_samples_of_an_instance(
         await p.writer.dispose(Shape("RED"))
         await arrived(p, Shape("RED", 3))
         infos = [sample.info for sample in p.reader.take()]
-    assert [info.sample_rank for info in infos] == [3, 0, 2, 1, 0]
-    assert [info.disposed_generation_count for info in infos] == [0, 0, 0, 0, 1]
-    assert [info.generation_rank for info in infos] == [1, 0, 1, 1, 0]
+    assert [info.sample_rank for info in infos] == [3, 2, 1, 0, 0]
+    assert [info.disposed_generation_count for info in infos] == [0, 0, 0, 1, 0]
+    assert [info.generation_rank for info in infos] == [1, 1, 1, 0, 0]
 
 
 @in_trio

@@ -136,7 +136,7 @@ async def test_history_depth_bounds_what_a_late_joiner_gets(domain: int) -> None
         await reader.wait_for_matched(timeout=5)
         await reader.wait_for_historical_data(timeout=5)
         samples = [(sample.data.color, sample.data.x) for sample in reader.take()]
-        assert samples == [("RED", 8), ("BLUE", 8), ("RED", 9), ("BLUE", 9)]
+        assert samples == [("RED", 8), ("RED", 9), ("BLUE", 8), ("BLUE", 9)]
 
 
 @in_trio
