@@ -144,7 +144,8 @@ def test_what_cannot_be_done_ends_with_the_words_that_the_suite_looks_for(
 
 
 @pytest.mark.parametrize(
-    "words", ["-P -c RED -f 1 -s 1 --lifespan 1", "-S -c RED", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"]
+    "words",
+    ["-P -c RED -f 1 -s 1 --lifespan 1", "-S -c RED", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"],
 )
 def test_what_can_be_done_is_done(words: str) -> None:
     assert unsupported(_options(words)) is None
