@@ -88,6 +88,7 @@ class TypeSupport(Generic[T]):
         self._sources: dict[tuple[Any, ...], str] = {}
         self._writers: dict[tuple[Any, ...], Callable[[Any], bytes]] = {}
         self.serializers_asked_for = {}
+        self._key_hash_forms: dict[DataRepresentationId, tuple[bool, Callable[[Any], bytes] | None]] = {}
         key, canonical = key_type(struct), canonical_key_type(struct)
         self.is_keyed: bool = canonical is not None
         self.deserialize = self._reader(struct)
@@ -199,15 +200,23 @@ class TypeSupport(Generic[T]):
         """
         if self._canonical is None:
             return bytes(KEY_HASH_OCTETS)
-        encoding = Encoding(_checked_representation(representation), little_endian=False)
-        octets = key
-        if not encoding.is_xcdr2 and alignments_differ(self._canonical):
-            octets = self._writer(self._canonical, encoding, header=False)(
-                self._read_canonical(_CANONICAL_HEADER + key)
-            )
-        if is_secret or hash_is_digest(self.struct, self._canonical, encoding):
+        is_digest, write = self._key_hash_form(_checked_representation(representation))
+        octets = key if write is None else write(self._read_canonical(_CANONICAL_HEADER + key))
+        if is_secret or is_digest:
             return hashlib.md5(octets, usedforsecurity=False).digest()
         return octets.ljust(KEY_HASH_OCTETS, b"\0")
+
+    def _key_hash_form(self, representation: DataRepresentationId) -> tuple[bool, Callable[[Any], bytes] | None]:
+        """(whether hashes are digests, what writes the octets to be hashed where they are not the canonical key)."""
+        form = self._key_hash_forms.get(representation)
+        if form is None:
+            assert self._canonical is not None
+            encoding = Encoding(representation, little_endian=False)
+            is_digest = hash_is_digest(self.struct, self._canonical, encoding)
+            differs = not encoding.is_xcdr2 and alignments_differ(self._canonical)
+            form = is_digest, self._writer(self._canonical, encoding, header=False) if differs else None
+            self._key_hash_forms[representation] = form
+        return form
 
     def key_from_key_hash(self, key_hash: bytes, representation: DataRepresentationId | None = None) -> bytes | None:
         """The canonical key, where a key hash holds the key itself; None where it is a digest or no such key.
@@ -217,10 +226,10 @@ class TypeSupport(Generic[T]):
         """
         if self._canonical is None or len(key_hash) != KEY_HASH_OCTETS:
             return None
-        representation = self.representations[0] if representation is None else representation
-        encoding = Encoding(_checked_representation(representation), little_endian=False)
-        if hash_is_digest(self.struct, self._canonical, encoding):
+        representation = _checked_representation(self.representations[0] if representation is None else representation)
+        if self._key_hash_form(representation)[0]:
             return None
+        encoding = Encoding(representation, little_endian=False)
         header = encoding.encapsulation_id(Extensibility.FINAL) + bytes(2)
         for length in range(1, KEY_HASH_OCTETS + 1):
             if any(key_hash[length:]):
@@ -352,6 +361,8 @@ def _no_key(_: Any) -> bytes:
 
 
 def _checked_representation(representation: Any) -> DataRepresentationId:
+    if representation is XCDR1 or representation is XCDR2:
+        return representation
     if representation in (XCDR1, XCDR2):
         return DataRepresentationId(representation)
     raise BadParameter(f"the representation is XCDR1 or XCDR2, not {representation!r}")
