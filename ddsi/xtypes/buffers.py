@@ -17,7 +17,6 @@ from collections.abc import Iterable
 from typing import Any
 
 __all__ = [
-    "NOT_SEQUENCES",
     "array_numbers",
     "array_octets",
     "booleans",
@@ -29,6 +28,7 @@ __all__ = [
     "number_array",
     "numbers",
     "octets",
+    "sequence",
     "wchars",
     "wchars_from",
 ]
@@ -59,9 +59,9 @@ def octets(value: Any) -> Buffer:
     try:
         view = memoryview(value)
     except TypeError:
-        return bytes(_sequence(value))
-    if view.itemsize != 1:
-        return bytes(view.tolist())
+        return bytes(sequence(value))
+    if view.itemsize != 1 or not view.ndim:  # bytes(3) would be three zeros
+        return bytes(sequence(view.tolist()))
     if view.format in ("b", "<b"):  # signed: -1 is no octet
         return bytes(view.tolist())
     return view.cast("B") if view.c_contiguous else view.tobytes()
@@ -84,11 +84,13 @@ def numbers(value: Any, code: str, size: int, order: str, *, swap: bool) -> tupl
     try:
         view = memoryview(value)
     except (TypeError, ValueError):
-        return numbers(list(_sequence(value)), code, size, order, swap=swap)
+        return numbers(list(sequence(value)), code, size, order, swap=swap)
     return _numbers_of_view(view, code, size, order, swap=swap)
 
 
 def _numbers_of_view(view: memoryview, code: str, size: int, order: str, *, swap: bool) -> tuple[Any, int]:
+    if not view.ndim:
+        raise TypeError("a single number is no sequence")
     letter = view.format.lstrip("@=<>")
     foreign = view.format[:1] == (">" if _LITTLE_HOST else "<")
     if letter in _FORMATS[code] and view.itemsize == size:
@@ -123,7 +125,7 @@ def number_array(code: str, buffer: Any, start: int, end: int, *, swap: bool) ->
 
 def booleans(value: Any) -> bytes:
     """One octet for each, 0 or 1.  Raises TypeError unless all are booleans (Python's or numpy's)."""
-    packed = bytes(value.tolist() if hasattr(value, "tolist") else list(_sequence(value)))
+    packed = bytes(sequence(value.tolist() if hasattr(value, "tolist") else value))
     if packed.strip(b"\x00\x01"):
         raise ValueError("a boolean is True or False")
     return packed
@@ -153,18 +155,15 @@ def wchars_from(packed: Any, *, little_endian: bool) -> str:
 
 
 def _joined(value: Iterable[str]) -> str:
-    items = list(_sequence(value))
+    items = list(sequence(value))
     if any(len(item) != 1 for item in items):
         raise ValueError("a char is a string of one character")
     return "".join(items)
 
 
-NOT_SEQUENCES = frozenset({str, dict, set, frozenset})
-"""What can be iterated over, but is no sequence of elements."""
-
-
-def _sequence(value: Any) -> Any:
-    if value.__class__ in NOT_SEQUENCES or not hasattr(value, "__getitem__") or not hasattr(value, "__len__"):
+def sequence(value: Any) -> Any:
+    """The value itself, if it is a sequence of elements; TypeError for a string, and for what is merely iterable."""
+    if isinstance(value, (str, dict)) or not hasattr(value, "__getitem__") or not hasattr(value, "__len__"):
         raise TypeError(f"not a sequence: {type(value).__name__}")
     return value
 
@@ -176,7 +175,7 @@ def flatten(value: Any, dimensions: tuple[int, ...]) -> Any:
     is taken as it is when its size fits.
     """
     if value.__class__ is not str:  # characters may come as a string
-        _sequence(value)
+        sequence(value)
     if len(dimensions) == 1:
         if len(value) != dimensions[0]:
             raise ValueError(f"{len(value)} elements where the array has {dimensions[0]}")

@@ -46,7 +46,12 @@ def check_value(member: Member, value: Any, path: str, *, depth: int = 0) -> Non
     """Raise BadParameter, beginning with ``path``, unless ``value`` fits the member."""
     if value is None and member.is_optional:
         return
-    _check(member.type, value, path, depth)
+    try:
+        _check(member.type, value, path, depth)
+    except (BadParameter, NameError):
+        raise
+    except Exception as error:  # from a method of the value's own, or numpy's word on the truth of an array
+        raise BadParameter(f"{path}: {_shown(value)} is no {member.type} ({type(error).__name__}: {error})") from error
 
 
 def _check(type_: IdlType, value: Any, path: str, depth: int) -> None:
@@ -95,7 +100,7 @@ def _check_primitive(type_: Primitive, value: Any, path: str) -> None:
 def _check_integer(code: str, size: int, value: Any, path: str, name: str) -> None:
     try:
         number = operator.index(value)
-    except TypeError:
+    except (TypeError, BadParameter):
         raise BadParameter(f"{path}: {_shown(value)} is no integer, as {name} needs") from None
     bits = 8 * size
     lowest, highest = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if code.islower() else (0, 2**bits - 1)
@@ -254,5 +259,8 @@ def _name(type_: StructType) -> str:
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:
+        text = f"a {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:76]}..."

@@ -40,6 +40,7 @@ def generate_writer(
     source = Source(f"write {struct_type.type_name}, {encoding.name}")
     source.names |= {name: getattr(buffers, name) for name in _RUNTIME} | {
         "PLAIN_SEQUENCES": PLAIN_SEQUENCES,
+        "encode": str.encode,  # of a str only, unlike a method of that name; and CPython 3.11 may crash on str.encode()
         "enum_values": enum_values,
         "pack_numbers": pack_numbers,
         "pack_strings": pack_strings,
@@ -52,7 +53,7 @@ def generate_writer(
 
 _RUNTIME = (
     *("array_numbers", "array_octets", "booleans", "chars", "flatten", "numbers", "octets", "wchars"),
-    "NOT_SEQUENCES",
+    "sequence",
 )
 
 

@@ -49,7 +49,9 @@ def enum_values(values: Any, python_class: type[enum.IntEnum]) -> list[int]:
     return [item._value_ if item.__class__ is python_class else python_class(item)._value_ for item in values]
 
 
-def pack_numbers(order: str, code: str, values: list[int]) -> bytes:
+def pack_numbers(order: str, code: str, values: Any) -> bytes:
+    if hasattr(values, "tolist"):
+        values = values.tolist()
     return struct.pack(f"{order}{len(values)}{code}", *values)
 
 
@@ -128,7 +130,7 @@ class ValueWriter:
 
     def _string(self, type_: String, expression: str) -> None:
         emitter = self._emitter
-        octets = self._local("s", f"{expression}.encode()")
+        octets = self._local("s", f"encode({expression})")
         count = self._local("n", f"len({octets})")
         condition = f"0 in {octets}"  # IDL strings hold no NUL: a peer would read up to it
         if type_.bound is not None:
@@ -248,19 +250,25 @@ class ValueWriter:
 
     def _sequence(self, type_: SequenceType, expression: str) -> None:
         emitter = self._emitter
-        value = self._local("v", expression)
-        if isinstance(type_.element, EnumType):
-            self._source.line(
-                f"{value} = enum_values({value}, {self._source.constant('Enum', type_.element.python_class)})"
-            )
+        value = self._sequence_local(type_, expression)
         count = self._local("n", f"len({value})")
-        condition = f"{value}.__class__ in NOT_SEQUENCES"
-        self._refuse(condition if type_.bound is None else f"{count} > {type_.bound} or {condition}")
+        if type_.bound is not None:
+            self._refuse(f"{count} > {type_.bound}")
         delimiter = self._open_dheader(type_)
         emitter.align(4)
         emitter.item("I", 4, count)
         self._elements(type_, type_.element, value, count)
         self._close_dheader(delimiter)
+
+    def _sequence_local(self, type_: SequenceType | ArrayType, expression: str) -> str:
+        """A variable with the elements: whatever the value is, it is a sequence."""
+        source = self._source
+        value = self._local("v", expression)
+        with source.block(f"if {value}.__class__ is not list:"):
+            source.line(f"{value} = sequence({value})")
+        if isinstance(type_.element, EnumType):
+            source.line(f"{value} = enum_values({value}, {source.constant('Enum', type_.element.python_class)})")
+        return value
 
     def _map(self, type_: MapType, expression: str) -> None:
         emitter = self._emitter
@@ -278,13 +286,7 @@ class ValueWriter:
         self._close_dheader(delimiter)
 
     def _array(self, type_: ArrayType, expression: str) -> None:
-        value = self._local("v", expression)
-        self._refuse(f"{value}.__class__ in NOT_SEQUENCES")
-        self._source.line(f"{value} = flatten({value}, {type_.dimensions})")
-        if isinstance(type_.element, EnumType):
-            self._source.line(
-                f"{value} = enum_values({value}, {self._source.constant('Enum', type_.element.python_class)})"
-            )
+        value = self._sequence_local(type_, f"flatten({expression}, {type_.dimensions})")
         delimiter = self._open_dheader(type_)
         self._elements(type_, type_.element, value, str(type_.count))
         self._close_dheader(delimiter)
