@@ -162,7 +162,9 @@ def _joined(value: Iterable[str]) -> str:
 
 
 def sequence(value: Any) -> Any:
-    """The value itself, if it is a sequence of elements; TypeError for a string, and for what is merely iterable."""
+    """The value, if it is a sequence of elements; TypeError for a string, and for what is merely iterable."""
+    if isinstance(value, memoryview):
+        value = value.tolist()  # with several dimensions it does not iterate over its rows
     if isinstance(value, (str, dict)) or not hasattr(value, "__getitem__") or not hasattr(value, "__len__"):
         raise TypeError(f"not a sequence: {type(value).__name__}")
     return value
