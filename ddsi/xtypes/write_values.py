@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from .buffers import needs_swap
+from .defaults import numpy_dtype
 from .layout import UNKNOWN, Encoding, after, has_dheader, static_size
 from .model import (
     BOOLEAN,
@@ -195,9 +196,11 @@ class ValueWriter:
                 source.line(f"{buffer} = octets({buffer})")
         elif element.is_number:
             swap = needs_swap(little_endian=self._encoding.little_endian)
+            expression = self._local("x", expression)
             buffer, count = source.fresh("b"), source.fresh("n")
             arguments = f"{expression}, '{element.code}', {element.size}, '{self._encoding.order}', swap={swap}"
-            source.line(f"{buffer}, {count} = numbers({arguments})")
+            found = self._unless_numpy(type_, expression, f"({expression}, len({expression}))", f"numbers({arguments})")
+            source.line(f"{buffer}, {count} = {found}")
             return buffer, count
         else:
             buffer = self._local("b", self._characters(element, expression))
@@ -220,10 +223,12 @@ class ValueWriter:
             swap = needs_swap(little_endian=self._encoding.little_endian)
             layout = f"'{element.code}', {element.size}, '{self._encoding.order}', swap={swap}"
             buffer = f"array_numbers({expression}, {dimensions}, {layout})"
-            if len(dimensions) == 1 and not type_.numpy:
-                if octets <= _IN_RUN:
-                    self._numbers_in_run(type_, element, expression, buffer)
-                    return
+            if type_.numpy:
+                buffer = self._unless_numpy(type_, expression, expression, buffer)
+            elif len(dimensions) == 1 and octets <= _IN_RUN:
+                self._numbers_in_run(type_, element, expression, buffer)
+                return
+            elif len(dimensions) == 1:
                 pack = self._source.packer(f"{self._encoding.order}{type_.count}{element.code}")
                 buffer = f"{pack}(*{expression}) if {expression}.__class__ is list else {buffer}"
         else:
@@ -237,6 +242,24 @@ class ValueWriter:
             emitter.part(name, str(octets), emitter.position.residue.advance(octets))
         if not element.is_number:
             self._refuse(f"len({name}) != {octets}")
+
+    def _unless_numpy(self, type_: SequenceType | ArrayType, value: str, found: str, otherwise: str) -> str:
+        """The expression ``found`` where ``value`` is a numpy array whose memory holds the octets as they go.
+
+        Only asked where the member says that it is numpy's, since asking costs time.
+        """
+        if not type_.numpy or needs_swap(little_endian=self._encoding.little_endian):
+            return otherwise
+        import numpy  # here, since the user's annotation named it
+
+        assert isinstance(type_.element, Primitive)
+        conditions = (
+            f"{value}.__class__ is {self._source.constant('ndarray', numpy.ndarray)}",
+            f"{value}.dtype is {self._source.constant('dtype', numpy.dtype(numpy_dtype(type_.element)))}",
+            f"{value}.shape == {type_.dimensions}" if isinstance(type_, ArrayType) else f"{value}.ndim == 1",
+            f"{value}.flags.c_contiguous",
+        )
+        return f"{found} if {' and '.join(conditions)} else {otherwise}"
 
     def _numbers_in_run(self, type_: ArrayType, element: Primitive, value: str, buffer: str) -> None:
         """A few numbers are items as any others; ``buffer`` makes octets of what is no plain sequence of them."""

@@ -160,3 +160,19 @@ def test_a_boolean_of_two_is_malformed() -> None:
     for length in (len(octets), len(octets) - 8):
         with pytest.raises(MalformedSample, match="mask"):
             deserialize(Arrays, bytes(octets[:length]))
+
+
+@pytest.mark.parametrize("byteorder", ["little", "big"])
+def test_numpy_arrays_of_any_memory_give_the_same_octets(byteorder: Any) -> None:
+    matrix, series = np.arange(6, dtype=np.float32).reshape(2, 3), np.arange(4)
+    expected = serialize(Arrays([True], matrix.tolist(), series.tolist()), byteorder=byteorder)  # type: ignore[arg-type]
+    for order in "<>":
+        for same in (matrix, matrix.astype(order + "f4"), np.asfortranarray(matrix), matrix.astype("i2")):
+            sample = Arrays(np.array([True]), same, np.arange(0, 8, 2)[:4] // 2)
+            assert serialize(sample, byteorder=byteorder) == expected
+    sliced = Arrays(np.array([True]), np.array([matrix, matrix])[1], np.array([series, series]).T[:, 0])
+    assert serialize(sliced, byteorder=byteorder) == expected
+    wrong: Any
+    for wrong in (matrix.T, series, np.zeros((2, 3, 1), np.float32)):
+        with pytest.raises(BadParameter, match="matrix"):
+            serialize(Arrays(np.array([True]), wrong, series), byteorder=byteorder)
