@@ -92,10 +92,12 @@ class AckNackSchedule:
         "asked_sn",
         "due",
         "is_wanted",
+        "preemptive_left",
     )
 
     def __init__(self) -> None:
         self.due = math.inf
+        self.preemptive_left = math.inf  # so many times more the writer is called before its first HEARTBEAT
         self.asked_sn = 0  # the highest number that was asked for; what lies above is news
         self.is_wanted = False  # a HEARTBEAT wants an answer, whether anything is missing or not
         self._preemptive = True
@@ -127,7 +129,8 @@ class AckNackSchedule:
 
     def preemptive_sent(self, now: float) -> None:
         self._preemptive_at = now
-        self.due = now + self._preemptive_period
+        self.preemptive_left -= 1
+        self.due = now + self._preemptive_period if self.preemptive_left > 0 else math.inf
         self._preemptive_period = min(self._preemptive_period * 2, PREEMPTIVE_MAX)
 
     def acknowledge(self, now: float) -> None:

@@ -96,7 +96,7 @@ class DataReader(SampleReader[T], Endpoint):
             is_keyed=support.is_keyed,
             keys=_key_codec(topic) if support.is_keyed else None,
             content_filter=(filtered._announced, filtered._evaluate) if filtered is not None else None,
-            type_information=support.type_information if self._pump.engine.config.announce_types else b"",
+            types=support.type_description if self._pump.engine.config.announce_types else None,
         )
         history = self._reader.history
         assert history is not None
@@ -228,7 +228,7 @@ class DataReader(SampleReader[T], Endpoint):
 
     def _status_changed(self, status: Status) -> None:
         if isinstance(status, InconsistentTopic):
-            self._topic._found_inconsistent(status.remote_type_name)
+            self._topic._found_inconsistent(status)
         super()._status_changed(status)
 
     def _on_close(self) -> None:

@@ -85,7 +85,7 @@ class DataWriter(Endpoint, Generic[T]):
             self._pump.now(),
             is_keyed=support.is_keyed,
             compile_filter=filter_compiler(support),
-            type_information=support.type_information if self._pump.engine.config.announce_types else b"",
+            types=support.type_description if self._pump.engine.config.announce_types else None,
         )
         self._hides_keys = support.is_keyed and self._writer.protection.key_protected
         self._key_hashes: dict[bytes, bytes] = {}
@@ -273,7 +273,7 @@ class DataWriter(Endpoint, Generic[T]):
 
     def _status_changed(self, status: Status) -> None:
         if isinstance(status, InconsistentTopic):
-            self._topic._found_inconsistent(status.remote_type_name)
+            self._topic._found_inconsistent(status)
         super()._status_changed(status)
 
     def _on_close(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from ..structure.errors import BadParameter
@@ -69,13 +70,10 @@ class Topic(Entity, Generic[T]):
         follow_all(endpoint._plan(topic=after) for endpoint in endpoints if endpoint.topic is self)
         self._own_qos = self._qos = after
 
-    def _found_inconsistent(self, remote_type_name: str) -> None:
+    def _found_inconsistent(self, met: InconsistentTopic) -> None:
         """One of its writers or readers met a peer that uses the name with another type."""
-        total_count = self._inconsistent_count + 1
-        self._inconsistent_count = total_count
-        self._status_changed(
-            InconsistentTopic(total_count=total_count, total_count_change=1, remote_type_name=remote_type_name)
-        )
+        self._inconsistent_count += 1
+        self._status_changed(replace(met, total_count=self._inconsistent_count, total_count_change=1))
 
     def _on_close(self) -> None:
         self._participant._disown(self)

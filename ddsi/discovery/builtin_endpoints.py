@@ -36,6 +36,7 @@ class Delivery(Enum):
     TO_ALL = "each reader gets every change, in order"
     DIRECTED = "each change is for one participant, and in order (DDS-Security 1.1 §7.4.4)"
     STATELESS = "each change is for one participant, and nobody keeps account (DDS-Security 1.1 §7.4.3)"
+    ADDRESSED = "each change is for one participant; but others' writers send all to all, as readers must expect"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +53,14 @@ class BuiltinTopic:
     delivery: Delivery = Delivery.TO_ALL
 
     @property
-    def is_directed(self) -> bool:
-        """Is each change for one participant?"""
+    def filters(self) -> bool:
+        """Does our writer send each participant its own changes only?"""
         return self.delivery is not Delivery.TO_ALL
+
+    @property
+    def is_directed(self) -> bool:
+        """Do the writers of all vendors?  It is by these topics that security itself talks."""
+        return self.delivery in (Delivery.DIRECTED, Delivery.STATELESS)
 
     @property
     def is_plain(self) -> bool:
@@ -134,6 +140,42 @@ BUILTIN_TOPICS = (
         _Bits.PARTICIPANT_MESSAGE_SECURE_WRITER,
         _Bits.PARTICIPANT_MESSAGE_SECURE_READER,
     ),
+    BuiltinTopic(
+        "TypeLookupServiceRequest",
+        ids.TYPE_LOOKUP_REQUEST_WRITER,
+        ids.TYPE_LOOKUP_REQUEST_READER,
+        _Bits.TYPE_LOOKUP_REQUEST_WRITER,
+        _Bits.TYPE_LOOKUP_REQUEST_READER,
+        _VOLATILE_QOS,
+        delivery=Delivery.ADDRESSED,
+    ),
+    BuiltinTopic(
+        "TypeLookupServiceReply",
+        ids.TYPE_LOOKUP_REPLY_WRITER,
+        ids.TYPE_LOOKUP_REPLY_READER,
+        _Bits.TYPE_LOOKUP_REPLY_WRITER,
+        _Bits.TYPE_LOOKUP_REPLY_READER,
+        _VOLATILE_QOS,
+        delivery=Delivery.ADDRESSED,
+    ),
+    BuiltinTopic(
+        "TypeLookupServiceRequestSecure",
+        ids.TYPE_LOOKUP_REQUEST_SECURE_WRITER,
+        ids.TYPE_LOOKUP_REQUEST_SECURE_READER,
+        _Bits.TYPE_LOOKUP_REQUEST_SECURE_WRITER,
+        _Bits.TYPE_LOOKUP_REQUEST_SECURE_READER,
+        _VOLATILE_QOS,
+        delivery=Delivery.ADDRESSED,
+    ),
+    BuiltinTopic(
+        "TypeLookupServiceReplySecure",
+        ids.TYPE_LOOKUP_REPLY_SECURE_WRITER,
+        ids.TYPE_LOOKUP_REPLY_SECURE_READER,
+        _Bits.TYPE_LOOKUP_REPLY_SECURE_WRITER,
+        _Bits.TYPE_LOOKUP_REPLY_SECURE_READER,
+        _VOLATILE_QOS,
+        delivery=Delivery.ADDRESSED,
+    ),
 )
 
 ANNOUNCED_ENDPOINTS = (
@@ -145,5 +187,9 @@ ANNOUNCED_ENDPOINTS = (
     | _Bits.SUBSCRIPTIONS_DETECTOR
     | _Bits.PARTICIPANT_MESSAGE_WRITER
     | _Bits.PARTICIPANT_MESSAGE_READER
+    | _Bits.TYPE_LOOKUP_REQUEST_WRITER
+    | _Bits.TYPE_LOOKUP_REQUEST_READER
+    | _Bits.TYPE_LOOKUP_REPLY_WRITER
+    | _Bits.TYPE_LOOKUP_REPLY_READER
 )
 """What every participant has; its hooks add the secure ones."""

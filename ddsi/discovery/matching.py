@@ -17,7 +17,15 @@ from ..structure.qos import EndpointQos
 from ..structure.qos_policies import DataRepresentation, DataRepresentationId
 from ..structure.status import Incompatibility
 
-__all__ = ["MatchRefusal", "RefusalKind", "incompatibilities", "judge", "partitions_match", "types_match"]
+__all__ = [
+    "MatchRefusal",
+    "RefusalKind",
+    "incompatibilities",
+    "judge",
+    "names_refusal",
+    "partitions_match",
+    "policies_refusal",
+]
 
 # QosPolicyId_t, DDS 1.4 §2.3.3 and DDS-XTypes 1.3 annex D.
 _DURABILITY, _PRESENTATION, _DEADLINE, _LATENCY_BUDGET, _OWNERSHIP = 2, 3, 4, 5, 6
@@ -41,24 +49,29 @@ class MatchRefusal:
     """Why a writer and a reader of the same topic do not match, kept as a value because people will ask.
 
     ``offered`` is the writer's side, ``requested`` the reader's; ``incompatibilities`` names every policy when it is
-    QoS.
+    QoS.  ``detail``: where type names do not tell, what is between the types, the member's path first.
     """
 
     kind: RefusalKind
     offered: str
     requested: str
     incompatibilities: tuple[Incompatibility, ...] = ()
+    detail: str = ""
 
     def __str__(self) -> str:
         if self.incompatibilities:
             return "; ".join(map(str, self.incompatibilities))
-        return f"{self.kind}: offered {self.offered}, requested {self.requested}"
+        sides = f"{self.kind}: offered {self.offered}, requested {self.requested}"
+        return f"{sides}: {self.detail}" if self.detail else sides
 
 
 def judge(writer: DiscoveredWriterData, reader: DiscoveredReaderData) -> MatchRefusal | None:
-    """None if the two, of the same topic, match; else why they do not."""
-    if not types_match(writer, reader):
-        return MatchRefusal(RefusalKind.TYPE, _type_text(writer), _type_text(reader))
+    """None if the two, of the same topic, match; else why they do not.  Types go by name here."""
+    return names_refusal(writer, reader) or policies_refusal(writer, reader)
+
+
+def policies_refusal(writer: DiscoveredWriterData, reader: DiscoveredReaderData) -> MatchRefusal | None:
+    """The same of two whose types fit."""
     offered, requested = writer.qos.partition.names, reader.qos.partition.names
     if not partitions_match(offered, requested):
         return MatchRefusal(RefusalKind.PARTITION, repr(offered or _NO_PARTITION), repr(requested or _NO_PARTITION))
@@ -72,9 +85,12 @@ def _type_text(data: DiscoveredEndpointData) -> str:
     return f"{data.type_name} ({'with' if data.is_keyed else 'without'} key)"
 
 
-def types_match(writer: DiscoveredWriterData, reader: DiscoveredReaderData) -> bool:
-    """Same type name, and both keyed or both keyless (Fast DDS judges the latter by the entity kind too)."""
-    return writer.type_name == reader.type_name and writer.is_keyed == reader.is_keyed
+def names_refusal(writer: DiscoveredWriterData, reader: DiscoveredReaderData) -> MatchRefusal | None:
+    """None if both have one type name, and both are keyed or both keyless (Fast DDS judges the latter by the entity
+    kind too); what types are made of is judged elsewhere."""
+    if writer.type_name == reader.type_name and writer.is_keyed == reader.is_keyed:
+        return None
+    return MatchRefusal(RefusalKind.TYPE, _type_text(writer), _type_text(reader))
 
 
 def partitions_match(offered: tuple[str, ...], requested: tuple[str, ...]) -> bool:

@@ -36,6 +36,8 @@ __all__ = [
     "seal_payload",
 ]
 
+_READ_HERE = (ParameterId.DATA_TAGS, ParameterId.AVAILABLE_EXTENDED_BUILTIN_ENDPOINTS)  # a policy; endpoints
+
 MAX_LOCATORS = 64
 """Of one kind in one announcement; those beyond are ignored, as a peer on so many networks can be reached without."""
 MAX_PROPERTIES = 256
@@ -128,7 +130,7 @@ class ParameterValues:
         return tuple(
             (pid, to_little_endian(pid, value, little_endian=self.little_endian))
             for pid, value in self._first.items()
-            if pid in SECURITY_PARAMETER_IDS and pid != ParameterId.DATA_TAGS  # which is a policy
+            if pid in SECURITY_PARAMETER_IDS and pid not in _READ_HERE
         )
 
 

@@ -22,6 +22,10 @@ _DEFAULT_LEASE = 100.0
 # What every stack has, for a peer that does not say: SPDP and SEDP, without topics.
 _DEFAULT_ENDPOINTS = 0x3F
 
+# BuiltinEndpoints holds two sets: the one that there always was, and from this bit on that of DDS-Security 1.2.
+_EXTENDED_FROM = 32
+_PLAIN_SET = (1 << _EXTENDED_FROM) - 1
+
 
 def encode_participant(data: DiscoveredParticipantData) -> bytes:
     """The payload of an SPDP announcement, PL_CDR_LE.  ValueError if a value is too long for a parameter (65532)."""
@@ -37,7 +41,9 @@ def participant_parameters(data: DiscoveredParticipantData, *, little_endian: bo
     out.octets(_PID.PROTOCOL_VERSION, bytes(data.protocol_version))
     out.octets(_PID.VENDORID, data.vendor_id)
     out.octets(_PID.PARTICIPANT_GUID, data.guid)
-    out.write(_PID.BUILTIN_ENDPOINT_SET, Writer.u32, int(data.builtin_endpoints))
+    out.write(_PID.BUILTIN_ENDPOINT_SET, Writer.u32, data.builtin_endpoints & _PLAIN_SET)
+    if data.builtin_endpoints > _PLAIN_SET:
+        out.write(_PID.AVAILABLE_EXTENDED_BUILTIN_ENDPOINTS, Writer.u32, data.builtin_endpoints >> _EXTENDED_FROM)
     if data.builtin_endpoint_qos:
         out.write(_PID.BUILTIN_ENDPOINT_QOS, Writer.u32, data.builtin_endpoint_qos)
     if data.domain_id is not None:
@@ -90,7 +96,7 @@ def read_participant(
         metatraffic_multicast=values.locators(_PID.METATRAFFIC_MULTICAST_LOCATOR, multicast=True),
         default_unicast=values.locators(_PID.DEFAULT_UNICAST_LOCATOR, multicast=False),
         default_multicast=values.locators(_PID.DEFAULT_MULTICAST_LOCATOR, multicast=True),
-        builtin_endpoints=BuiltinEndpoints(values.read(_PID.BUILTIN_ENDPOINT_SET, Reader.u32, _DEFAULT_ENDPOINTS)),
+        builtin_endpoints=_read_endpoints(values),
         builtin_endpoint_qos=values.read(_PID.BUILTIN_ENDPOINT_QOS, Reader.u32, 0),
         lease_duration=values.read(_PID.PARTICIPANT_LEASE_DURATION, _read_duration, _DEFAULT_LEASE),
         manual_liveliness_count=values.read(_PID.PARTICIPANT_MANUAL_LIVELINESS_COUNT, Reader.i32, 0),
@@ -99,6 +105,13 @@ def read_participant(
         properties=values.properties(),
         security_parameters=values.security_parameters(),
     )
+
+
+def _read_endpoints(values: ParameterValues) -> BuiltinEndpoints:
+    """The two sets in one; a participant that announces neither has what every one must have."""
+    endpoints = values.read(_PID.BUILTIN_ENDPOINT_SET, Reader.u32, _DEFAULT_ENDPOINTS)
+    extended = values.read(_PID.AVAILABLE_EXTENDED_BUILTIN_ENDPOINTS, Reader.u32, 0)
+    return BuiltinEndpoints(endpoints | extended << _EXTENDED_FROM)
 
 
 def _read_duration(reader: Reader) -> float:

@@ -38,6 +38,7 @@ class Timer(Enum):
     REMOTE_LIVELINESS = "a remote writer's liveliness lease"
     FLUSH = "queued samples must leave"
     LINGER = "a closed writer has waited long enough for acknowledgment"
+    TYPE_LOOKUP = "a participant was asked about types, and has not answered"
     SECURITY = "the hooks asked to be called"
 
 
@@ -114,6 +115,9 @@ class Alarms:
     def linger(self, writer: Guid, deadline: float) -> None:
         self._timers.set((Timer.LINGER, writer), deadline)
 
+    def type_lookup(self, prefix: bytes, deadline: float) -> None:
+        self._timers.set((Timer.TYPE_LOOKUP, prefix), deadline)
+
     def security(self, deadline: float) -> None:
         self._timers.set(Timer.SECURITY, deadline)
 
@@ -152,6 +156,8 @@ class Alarms:
                 engine.liveliness.remote_writer_due(subjects[0], now)
             case Timer.FLUSH:
                 engine.flush()
+            case Timer.TYPE_LOOKUP:
+                engine.types.answer_overdue(subjects[0], now)
             case Timer.SECURITY:
                 engine.hooks_timer_fired()
                 engine.hooks.handle_timeout(now)

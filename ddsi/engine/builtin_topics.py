@@ -32,6 +32,11 @@ __all__ = ["BuiltinTopics"]
 
 EndpointData = DiscoveredWriterData | DiscoveredReaderData
 
+# Most participants never ask about types.  A writer that has nothing to say is called for some hundred milliseconds and
+# then left alone: when it has, its sample or its HEARTBEAT will tell.
+_SELDOM = frozenset(topic.name for topic in BUILTIN_TOPICS if topic.delivery is Delivery.ADDRESSED)
+_CALLS = 4
+
 
 class _Inbox:
     """A ChangeSink for a builtin topic: changes wait here until the datagram has been read to its end."""
@@ -64,13 +69,17 @@ class BuiltinTopics:
             ids.PARTICIPANT_MESSAGE_READER: partial(liveliness.receive_participant_message, is_secure=False),
             ids.PARTICIPANT_MESSAGE_SECURE_READER: partial(liveliness.receive_participant_message, is_secure=True),
             ids.SPDP_SECURE_READER: discovery.receive_secure_spdp,
+            ids.TYPE_LOOKUP_REQUEST_READER: partial(engine.types.receive_request, is_secure=False),
+            ids.TYPE_LOOKUP_REQUEST_SECURE_READER: partial(engine.types.receive_request, is_secure=True),
+            ids.TYPE_LOOKUP_REPLY_READER: engine.types.receive_reply,
+            ids.TYPE_LOOKUP_REPLY_SECURE_READER: engine.types.receive_reply,
         }
 
     def create(self, announced: BuiltinEndpoints) -> None:
         """Our endpoints: those whose bits we announce, and no others."""
         for topic in BUILTIN_TOPICS:
             if topic.announcer in announced:
-                self._engine.add_writer(_writer_data(topic, self._guid(topic.writer_id)), filters=topic.is_directed)
+                self._engine.add_writer(_writer_data(topic, self._guid(topic.writer_id)), filters=topic.filters)
             if topic.detector in announced:
                 reader = self._engine.add_reader(
                     _reader_data(topic, self._guid(topic.reader_id)),
@@ -146,7 +155,10 @@ class BuiltinTopics:
             engine.receivers_changed(writer)
             engine.writer_answers(writer, transmissions)
         else:
-            engine.matchmaker.attach_writer(engine.local_readers[local], data, proxy, proxy.metatraffic, now)
+            reader = engine.local_readers[local]
+            engine.matchmaker.attach_writer(reader, data, proxy, proxy.metatraffic, now)
+            if data.topic_name in _SELDOM:
+                reader.behavior.writers[data.guid].schedule.preemptive_left = _CALLS
 
     # --- the end of matches ------------------------------------------------------------------------------
 

@@ -292,6 +292,7 @@ class DiscoveryAgent:
         engine.builtin.participant_lost(proxy, now)
         del engine.participants[proxy.prefix]
         engine.alarms.no_lease(proxy)
+        engine.types.participant_lost(proxy.prefix)
         engine.hooks.remote_participant_lost(proxy.guid)
         if reason is LossReason.LEASE_EXPIRED:
             self._announcer.participant_lost(proxy.metatraffic, now)

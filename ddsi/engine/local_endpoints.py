@@ -159,8 +159,8 @@ class LocalWriter:
         )
         return self.incompatible
 
-    def inconsistent_topic(self, remote_type_name: str) -> Status:
-        self.inconsistent = _one_more(self.inconsistent, remote_type_name)
+    def inconsistent_topic(self, remote_type_name: str, reason: str) -> Status:
+        self.inconsistent = _one_more(self.inconsistent, remote_type_name, reason)
         return self.inconsistent
 
     def liveliness_lost(self) -> Status:
@@ -254,8 +254,8 @@ class LocalReader:
         )
         return self.rejected
 
-    def inconsistent_topic(self, remote_type_name: str) -> Status:
-        self.inconsistent = _one_more(self.inconsistent, remote_type_name)
+    def inconsistent_topic(self, remote_type_name: str, reason: str) -> Status:
+        self.inconsistent = _one_more(self.inconsistent, remote_type_name, reason)
         return self.inconsistent
 
     def key_of(self, change: CacheChange) -> bytes | None:
@@ -289,7 +289,7 @@ class LocalReader:
         return known.get(key_hash)
 
 
-def _one_more(status: InconsistentTopic, remote_type_name: str) -> InconsistentTopic:
+def _one_more(status: InconsistentTopic, remote_type_name: str, reason: str) -> InconsistentTopic:
     return InconsistentTopic(
-        total_count=status.total_count + 1, total_count_change=1, remote_type_name=remote_type_name
+        total_count=status.total_count + 1, total_count_change=1, remote_type_name=remote_type_name, reason=reason
     )

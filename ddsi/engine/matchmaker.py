@@ -11,7 +11,7 @@ from ..behavior.content_filtering_writer import ContentFilteringWriter
 from ..behavior.defrag import Defragmenter, Keep
 from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.stateless_reader import StatelessReader
-from ..discovery.matching import MatchRefusal, RefusalKind, judge
+from ..discovery.matching import MatchRefusal, RefusalKind, policies_refusal
 from ..discovery.participant_proxy import ParticipantProxy
 from ..spi import PENDING, Admission, Refused
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
@@ -21,6 +21,7 @@ from ..structure.status import SecurityRefused
 from ..trace.reasons import LossReason
 from .content_filters import writer_side_filter
 from .local_endpoints import LocalReader, LocalWriter
+from .type_matching import TypeVerdict
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -126,7 +127,7 @@ class Matchmaker:
         participant = engine.participants.get(data.guid[:12])
         if participant is None or not participant.is_admitted or writer.guid in engine.closing:
             return
-        refusal = judge(writer.data, data)
+        refusal, types = self._judge(writer.data, data, now)
         matched = data.guid in writer.behavior.readers
         if refusal is not None:
             if matched:
@@ -139,7 +140,7 @@ class Matchmaker:
                 writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
             else:
                 self._unmatch_reader(writer, data.guid, LossReason.REJECTED_BY_SECURITY, now)
-        else:
+        elif self._types_fit(writer.guid, data, types):
             admission = engine.hooks.match(writer.guid, data)
             if self._admits(writer.guid, data.guid, data.topic_name, admission):
                 self._match_reader(writer, data, now)
@@ -150,7 +151,7 @@ class Matchmaker:
         participant = engine.participants.get(data.guid[:12])
         if participant is None or not participant.is_admitted:
             return
-        refusal = judge(data, reader.data)
+        refusal, types = self._judge(data, reader.data, now)
         proxy = reader.behavior.writers.get(data.guid)
         if refusal is not None:
             if proxy is not None:
@@ -164,14 +165,14 @@ class Matchmaker:
                 proxy.locators = participant.user_traffic(data.unicast)
             else:
                 self.unmatch_writer(reader, data.guid, LossReason.REJECTED_BY_SECURITY, now)
-        else:
+        elif self._types_fit(reader.guid, data, types):
             admission = engine.hooks.match(reader.guid, data)
             if self._admits(reader.guid, data.guid, data.topic_name, admission):
                 self._match_writer(reader, data, now)
 
     def _consider_local(self, writer: LocalWriter, reader: LocalReader, now: float) -> None:
         """Two endpoints of this participant: the same rules, no wire."""
-        refusal = judge(writer.data, reader.data)
+        refusal, types = self._judge(writer.data, reader.data, now)
         matched = reader.guid in writer.behavior.local_readers
         if refusal is not None:
             if matched:
@@ -183,8 +184,43 @@ class Matchmaker:
             writer.behavior.local_readers[reader.guid].data = reader.data
             reader.behavior.writers[writer.guid].data = writer.data
             _tell_history(reader, writer.data)
-        elif writer.guid not in self._engine.closing:
+        elif writer.guid not in self._engine.closing and self._types_fit(writer.guid, reader.data, types):
             self._match_local(writer, reader, now)
+
+    # --- types -------------------------------------------------------------------------------------------
+
+    def _judge(
+        self, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float
+    ) -> tuple[MatchRefusal | None, TypeVerdict]:
+        """Policies first: for a pair that they keep apart nobody need be asked for its types."""
+        refusal = policies_refusal(writer, reader)
+        types = self._engine.type_matching.judge(writer, reader, now, may_ask=refusal is None)
+        return types.refusal or refusal, types
+
+    def _types_fit(self, local: Guid, remote: DiscoveredEndpointData, types: TypeVerdict) -> bool:
+        """A pair that is not refused and not matched yet: may it be, or does it wait for types?"""
+        engine = self._engine
+        is_news = True
+        if types.is_awaited:
+            is_news = engine.type_matching.wait(local, remote.guid)
+        else:
+            engine.type_matching.no_longer_waiting(local, remote.guid)
+        if types.step is not None and is_news:
+            engine.recorder.types_compared(local, remote.guid, remote.topic_name, types.step, types.detail)
+        return not types.is_awaited
+
+    def types_learnt(self, prefix: bytes, now: float) -> None:
+        """A participant has answered about its types, or will not: pairs that waited for it are looked at again."""
+        engine = self._engine
+        for local, remote in engine.type_matching.waiting_for(prefix):
+            writer, reader_data = engine.local_writers.get(local), engine.known_readers.get(remote)
+            reader, writer_data = engine.local_readers.get(local), engine.known_writers.get(remote)
+            if writer is not None and reader_data is not None:
+                self._consider_reader(writer, reader_data, now)
+            elif reader is not None and writer_data is not None:
+                self._consider_writer(reader, writer_data, now)
+            else:
+                engine.type_matching.no_longer_waiting(local, remote)
 
     def _match_reader(self, writer: LocalWriter, data: DiscoveredReaderData, now: float) -> None:
         engine = self._engine
@@ -321,7 +357,7 @@ class Matchmaker:
         if refusal.kind is RefusalKind.QOS:
             self._engine.status(endpoint.guid, endpoint.found_incompatible(other.guid, refusal.incompatibilities))
         elif refusal.kind is RefusalKind.TYPE:
-            self._engine.status(endpoint.guid, endpoint.inconsistent_topic(other.type_name))
+            self._engine.status(endpoint.guid, endpoint.inconsistent_topic(other.type_name, refusal.detail))
 
     def _admits(self, local: Guid, remote: Guid, topic_name: str, admission: Admission) -> bool:
         if admission is PENDING:
@@ -349,6 +385,7 @@ class Matchmaker:
     def _refused(self, local: Guid, remote: Guid, topic_name: str, refusal: MatchRefusal) -> bool:
         """Remember it; returns whether it is news."""
         self._no_longer_pending(local, remote)
+        self._engine.type_matching.no_longer_waiting(local, remote)
         if self.refusals.get((local, remote)) == refusal:
             return False
         self.refusals[(local, remote)] = refusal
@@ -364,6 +401,7 @@ class Matchmaker:
         """The remote endpoint is gone: neither is it refused nor does it wait."""
         self.refusals.pop((local, remote), None)
         self._no_longer_pending(local, remote)
+        self._engine.type_matching.no_longer_waiting(local, remote)
 
     def _no_longer_pending(self, local: Guid, remote: Guid) -> None:
         """The hooks asked us to wait for a pair that will not be one: they forget its keys as they would a match's."""

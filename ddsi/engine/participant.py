@@ -82,9 +82,11 @@ from .qos_changes import QosChanges
 from .recorder import Recorder
 from .timeliness import Timeliness
 from .type_lookup import TypeLookup
+from .type_matching import TypeMatching
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
+    from ..xtypes.type_object import TypeDescription
 
 __all__ = ["Participant", "ParticipantSetup"]
 
@@ -182,6 +184,7 @@ class Participant:
         self.admission = AdmissionDesk(self)
         self.builtin_readers = BuiltinTopicReaders(self)
         self.types = TypeLookup(self)
+        self.type_matching = TypeMatching(self)
         try:
             self.discovery = DiscoveryAgent(self, setup.announce_to, _own_data(setup, self.guid))
             self.builtin = BuiltinTopics(self)
@@ -293,15 +296,18 @@ class Participant:
         is_keyed: bool,
         compile_filter: CompileFilter | None = None,  # evaluates content filters, to spare readers what they would drop
         filters: bool = False,
-        type_information: bytes = b"",
+        types: TypeDescription | None = None,
         group: PublisherGroup | None = None,
     ) -> LocalWriter:
-        """Create, announce and match a writer.  Raises NotAllowedBySecurity, and nothing has changed then."""
+        """Create, announce and match a writer.  Raises NotAllowedBySecurity, and nothing has changed then.
+
+        ``types``: what its type is made of, if others are to know.
+        """
         self.now = now
         kind = EntityKind.WRITER_WITH_KEY if is_keyed else EntityKind.WRITER_NO_KEY
         data = DiscoveredWriterData(
             guid=self.new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
-            vendor_id=self.config.vendor_id, type_information=type_information,
+            vendor_id=self.config.vendor_id, type_information=self.types.announced(types),
         )  # fmt: skip
         if group is not None:
             data = replace(data, group_entity_id=announced_group(qos, group.entity_id))
@@ -328,13 +334,14 @@ class Participant:
         *,
         is_keyed: bool,
         keys: KeyCodec | None = None,
-        type_information: bytes = b"",
+        types: TypeDescription | None = None,
         content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
         uses_filter: bool = False,
         group: SubscriberGroup | None = None,
     ) -> LocalReader:
         """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then.
 
+        ``types``: what its type is made of, if others are to know.
         ``uses_filter``: its writers send each reader its own changes only, so that skipped numbers are no loss.
         ``content_filter``: what it lets pass, as announced and as evaluated; it implies ``uses_filter``.
         """
@@ -342,7 +349,7 @@ class Participant:
         kind = EntityKind.READER_WITH_KEY if is_keyed else EntityKind.READER_NO_KEY
         data = DiscoveredReaderData(
             guid=self.new_guid(kind), topic_name=topic_name, type_name=type_name, qos=qos,
-            vendor_id=self.config.vendor_id, type_information=type_information,
+            vendor_id=self.config.vendor_id, type_information=self.types.announced(types),
         )  # fmt: skip
         if content_filter is not None:
             data = replace(data, content_filter=content_filter[0])

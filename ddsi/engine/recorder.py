@@ -14,7 +14,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredParticipantData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
-from ..trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, SecurityStep
+from ..trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, SecurityStep, TypeStep
 from .effects import SendDatagram
 
 if TYPE_CHECKING:
@@ -100,7 +100,11 @@ class Recorder:
         for reason in refusal.incompatibilities:
             self._put("Incompatible", local, remote, topic_name, reason.policy, reason.offered, reason.requested)
         if not refusal.incompatibilities:
-            self._put("Incompatible", local, remote, topic_name, refusal.kind, refusal.offered, refusal.requested)
+            requested = f"{refusal.requested}: {refusal.detail}" if refusal.detail else refusal.requested
+            self._put("Incompatible", local, remote, topic_name, refusal.kind, refusal.offered, requested)
+
+    def types_compared(self, local: Guid, remote: Guid, topic_name: str, step: TypeStep, detail: str) -> None:
+        self._put("TypesCompared", local, remote, topic_name, step, detail)
 
     def security(self, remote: Guid | None, step: SecurityStep, detail: str = "") -> None:
         self._put("SecurityEvent", remote, step, detail)

@@ -11,7 +11,7 @@ be asked for again.  Our own are never displaced.
 from __future__ import annotations
 
 from collections import ChainMap, OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from ..structure.errors import MalformedMessage
 from ..xtypes.type_object import (
@@ -26,7 +26,7 @@ from ..xtypes.type_object import (
     equivalence_hash,
 )
 from ..xtypes.type_object.kinds import COMPLETE
-from ..xtypes.type_object.references import references
+from ..xtypes.type_object.references import hashed_only, references
 
 __all__ = ["MOST_NEEDED", "TypeRegistry"]
 
@@ -43,6 +43,7 @@ class TypeRegistry:
     def __init__(self) -> None:
         self._own: dict[HashedIdentifier, TypeObject] = {}
         self._own_octets: dict[HashedIdentifier, bytes] = {}
+        self._minimal_of: dict[HashedIdentifier, HashedIdentifier] = {}
         self._others: OrderedDict[tuple[bytes, HashedIdentifier], bytes] = OrderedDict()  # prefix empty: anybody's
         self._objects: dict[HashedIdentifier, TypeObject] = {}
         self._components: dict[bytes, dict[HashedIdentifier, TypeObject]] = {}
@@ -55,10 +56,18 @@ class TypeRegistry:
         for types in (description.minimal, description.complete):
             self._own |= types.objects
             self._own_octets |= types.octets
+        self._minimal_of |= zip(description.complete.objects, description.minimal.objects, strict=True)
 
     def own_octets(self, identifier: TypeIdentifier) -> bytes | None:
         """The TypeObject of one of our types as it is sent; None if it is none of ours."""
         return self._own_octets.get(identifier) if isinstance(identifier, HashedIdentifier) else None
+
+    def minimal_of(
+        self, identifiers: Iterable[TypeIdentifier]
+    ) -> tuple[tuple[HashedIdentifier, HashedIdentifier], ...]:
+        """The complete identifiers of our types that are among them, each with its minimal one."""
+        complete = [one for one in hashed_only(identifiers) if one in self._minimal_of]
+        return tuple((one, self._minimal_of[one]) for one in complete)
 
     # --- peers' ------------------------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """The entity ids and announcement bits of the builtin endpoints, in one table.
 
 RTPS 2.5 §9.3.1.5 (entity ids), §9.3.2.11 (BuiltinEndpointSet_t), DDS-XTypes 1.3 §7.6.3.3.4 (type lookup),
-DDS-Security 1.1 §7.3.7.1 and §7.4.5 (the secure ones).
+DDS-Security 1.1 §7.3.7.1 and §7.4.5 (the secure ones), DDS-Security 1.2 §7.5.9 (those of secure type lookup).
 """
 
 from __future__ import annotations
@@ -32,8 +32,12 @@ __all__ = [
     "SPDP_SECURE_WRITER",
     "SPDP_WRITER",
     "TYPE_LOOKUP_REPLY_READER",
+    "TYPE_LOOKUP_REPLY_SECURE_READER",
+    "TYPE_LOOKUP_REPLY_SECURE_WRITER",
     "TYPE_LOOKUP_REPLY_WRITER",
     "TYPE_LOOKUP_REQUEST_READER",
+    "TYPE_LOOKUP_REQUEST_SECURE_READER",
+    "TYPE_LOOKUP_REQUEST_SECURE_WRITER",
     "TYPE_LOOKUP_REQUEST_WRITER",
     "BuiltinEndpoints",
 ]
@@ -57,10 +61,15 @@ PARTICIPANT_MESSAGE_SECURE_WRITER, PARTICIPANT_MESSAGE_SECURE_READER = _id("ff02
 PARTICIPANT_STATELESS_MESSAGE_WRITER, PARTICIPANT_STATELESS_MESSAGE_READER = _id("000201c3"), _id("000201c4")
 PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER = _id("ff0202c3")
 PARTICIPANT_VOLATILE_MESSAGE_SECURE_READER = _id("ff0202c4")
+TYPE_LOOKUP_REQUEST_SECURE_WRITER, TYPE_LOOKUP_REQUEST_SECURE_READER = _id("ff0300c3"), _id("ff0300c4")
+TYPE_LOOKUP_REPLY_SECURE_WRITER, TYPE_LOOKUP_REPLY_SECURE_READER = _id("ff0301c3"), _id("ff0301c4")
 
 
 class BuiltinEndpoints(IntFlag):
-    """BuiltinEndpointSet_t: which builtin endpoints a participant announces (PID 0x0058)."""
+    """BuiltinEndpointSet_t: which builtin endpoints a participant announces (PID 0x0058).
+
+    From bit 32 on: those of DDS-Security 1.2, for which a parameter of its own (PID 0x1007) has bits from 0 on.
+    """
 
     PARTICIPANT_ANNOUNCER = 1 << 0
     PARTICIPANT_DETECTOR = 1 << 1
@@ -88,3 +97,7 @@ class BuiltinEndpoints(IntFlag):
     PARTICIPANT_SECURE_READER = 1 << 27
     TOPICS_ANNOUNCER = 1 << 28
     TOPICS_DETECTOR = 1 << 29
+    TYPE_LOOKUP_REQUEST_SECURE_WRITER = 1 << 32
+    TYPE_LOOKUP_REQUEST_SECURE_READER = 1 << 33
+    TYPE_LOOKUP_REPLY_SECURE_WRITER = 1 << 34
+    TYPE_LOOKUP_REPLY_SECURE_READER = 1 << 35

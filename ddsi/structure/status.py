@@ -175,11 +175,15 @@ class SampleRejected:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InconsistentTopic:
-    """A peer uses the topic's name with another type."""
+    """A peer uses the topic's name with another type.
+
+    ``reason``: what is between the types, the member's path first; empty where their names tell.
+    """
 
     total_count: int = 0
     total_count_change: int = 0
     remote_type_name: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -40,7 +40,7 @@ def event_text(event: TraceEvent, names: Names) -> str:
             return _participant(event, names)
         case e.EndpointCreated() | e.EndpointClosed() | e.EndpointDiscovered() | e.EndpointChanged() | e.EndpointLost():
             return _endpoint(event, names)
-        case e.Matched() | e.Unmatched() | e.Incompatible() | e.TopicInconsistent():
+        case e.Matched() | e.Unmatched() | e.Incompatible() | e.TopicInconsistent() | e.TypesCompared():
             return _matching(event, names)
         case e.ChangeWritten() | e.SampleDelivered() | e.SampleLost() | e.SampleRejected() | e.Acknowledged():
             return _data(event, names)
@@ -98,6 +98,8 @@ def _matching(event: TraceEvent, names: Names) -> str:
         case e.Incompatible(local=local, remote=remote, policy=policy, offered=offered, requested=requested):
             policies = f"{policy} offered {printable(offered)}, requested {printable(requested)}"
             return f"no match of {names.guid(local)} and {names.guid(remote)}: {policies}"
+        case e.TypesCompared(local=local, remote=remote, step=step, detail=detail):
+            return f"types of {names.guid(local)} and {names.guid(remote)}: {step}{_detail(detail)}"
         case e.TopicInconsistent(local=local, remote=remote, local_type=local_type, remote_type=remote_type):
             types = f"type {printable(local_type)} here, {printable(remote_type)} there"
             return f"no match of {names.guid(local)} and {names.guid(remote)}: {types}"

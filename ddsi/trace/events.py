@@ -18,7 +18,7 @@ from ..structure.guid import Guid, GuidPrefix
 from ..structure.locator import Locator
 from .event import Category, MalformedTrace, Pairs, TraceEvent
 from .qos_text import qos_texts
-from .reasons import DropReason, LossReason, RejectReason, SampleLossReason
+from .reasons import DropReason, LossReason, RejectReason, SampleLossReason, TypeStep
 
 __all__ = [
     "EVENT_TYPES",
@@ -52,6 +52,7 @@ __all__ = [
     "StatusChanged",
     "TimerFired",
     "TopicInconsistent",
+    "TypesCompared",
     "Unmatched",
     "from_json",
 ]
@@ -289,6 +290,20 @@ class Incompatible(TraceEvent):
 
 
 @dataclass(frozen=True, slots=True)
+class TypesCompared(TraceEvent):
+    """The types of two endpoints are not plainly the same: they wait for more, or match all the same."""
+
+    NAME: ClassVar[str] = "types_compared"
+    CATEGORY: ClassVar[Category] = Category.MATCHING
+
+    local: Guid
+    remote: Guid
+    topic_name: str
+    step: TypeStep
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class TopicInconsistent(TraceEvent):
     """Two endpoints agree on the topic's name, but their types cannot be assigned."""
 
@@ -508,6 +523,7 @@ EVENT_TYPES: dict[str, type[TraceEvent]] = {
         Matched,
         Unmatched,
         Incompatible,
+        TypesCompared,
         TopicInconsistent,
         ChangeWritten,
         SampleDelivered,

@@ -41,6 +41,12 @@ BUILTIN_NAMES: dict[EntityId, str] = {
         ("ParticipantMessage", ids.PARTICIPANT_MESSAGE_WRITER, ids.PARTICIPANT_MESSAGE_READER),
         ("TypeLookup request", ids.TYPE_LOOKUP_REQUEST_WRITER, ids.TYPE_LOOKUP_REQUEST_READER),
         ("TypeLookup reply", ids.TYPE_LOOKUP_REPLY_WRITER, ids.TYPE_LOOKUP_REPLY_READER),
+        (
+            "TypeLookup request secure",
+            ids.TYPE_LOOKUP_REQUEST_SECURE_WRITER,
+            ids.TYPE_LOOKUP_REQUEST_SECURE_READER,
+        ),
+        ("TypeLookup reply secure", ids.TYPE_LOOKUP_REPLY_SECURE_WRITER, ids.TYPE_LOOKUP_REPLY_SECURE_READER),
         ("SPDP secure", ids.SPDP_SECURE_WRITER, ids.SPDP_SECURE_READER),
         ("SEDP pub secure", ids.SEDP_PUBLICATIONS_SECURE_WRITER, ids.SEDP_PUBLICATIONS_SECURE_READER),
         ("SEDP sub secure", ids.SEDP_SUBSCRIPTIONS_SECURE_WRITER, ids.SEDP_SUBSCRIPTIONS_SECURE_READER),

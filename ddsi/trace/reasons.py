@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["DropReason", "LossReason", "RejectReason", "SampleLossReason", "SecurityStep"]
+__all__ = ["DropReason", "LossReason", "RejectReason", "SampleLossReason", "SecurityStep", "TypeStep"]
 
 
 class DropReason(StrEnum):
@@ -153,3 +153,18 @@ class SecurityStep(StrEnum):
     """A match with this endpoint waits for its keys."""
     REVOKED = "revoked"
     """Our own identity or permissions have ended; the participant closes."""
+
+
+class TypeStep(StrEnum):
+    """What became of two endpoints whose types are not plainly the same: ``step`` in TypesCompared.  DDS-XTypes 1.3
+    §7.6.3.4.2."""
+
+    AWAITED = "awaited"
+    """The match waits: the other's TypeObjects have been asked for."""
+    ASSIGNABLE = "assignable"
+    """The types differ, and the reader's can be assigned from the writer's."""
+    BY_NAME = "by_name"
+    """The type names alone were compared; the detail says what was missing."""
+    EXTENSIBILITY = "extensibility"
+    """One is final and the other appendable, as IDL without annotations is for different vendors; in XCDR1 they are
+    written alike, and so they match by name."""

@@ -79,11 +79,16 @@ def type_mismatch(
     writer: TypeIdentifier,
     objects: Mapping[HashedIdentifier, TypeObject],
     consistency: TypeConsistency | None = None,
+    *,
+    ignores_extensibility: bool = False,
 ) -> TypeMismatch | MissingType | None:
     """None if the reader's type can be assigned from the writer's; else why not.
 
     ``objects`` holds the TypeObjects of both, ``consistency`` is the reader's policy (default: the specification's).
     Both identifiers are minimal ones, or both complete.
+
+    ``ignores_extensibility``: what is final in one and appendable in the other is compared as if both were final; that
+    is no rule of the specification, but such types are written alike in XCDR1.
     """
     consistency = consistency or TypeConsistency()
     if reader == writer and not isinstance(reader, UnknownIdentifier):
@@ -91,7 +96,9 @@ def type_mismatch(
     if consistency.kind == TypeConsistency.DISALLOW_TYPE_COERCION:
         return TypeMismatch("", f"the reader takes no type but its own: {reader!r}, not {writer!r}")
     try:
-        _Comparison(objects, consistency).compare(reader, writer, "", is_key=False)
+        _Comparison(objects, consistency, ignores_extensibility=ignores_extensibility).compare(
+            reader, writer, "", is_key=False
+        )
     except _MismatchFound as found:
         return found.mismatch
     except _TypeMissing as missing:
@@ -129,9 +136,16 @@ _Shape = (
 class _Comparison:
     """In all methods ``one`` is of the reader and ``two`` of the writer (the specification's T1 and T2)."""
 
-    def __init__(self, objects: Mapping[HashedIdentifier, TypeObject], consistency: TypeConsistency) -> None:
+    def __init__(
+        self,
+        objects: Mapping[HashedIdentifier, TypeObject],
+        consistency: TypeConsistency,
+        *,
+        ignores_extensibility: bool,
+    ) -> None:
         self._objects = objects
         self._consistency = consistency
+        self._ignored = TypeFlag.FINAL | TypeFlag.APPENDABLE if ignores_extensibility else TypeFlag(0)
         self._compared: set[tuple[TypeIdentifier, TypeIdentifier, bool]] = set()
         self._comparisons = 0
         self._depth = 0
@@ -159,7 +173,7 @@ class _Comparison:
             case UnionObject(), UnionObject():
                 _Unions(self, one, two, path).compare()
             case EnumObject(), EnumObject():
-                _compare_enums(one, two, path)
+                self._compare_enums(one, two, path)
             case StringIdentifier(), StringIdentifier() if one.wide == two.wide:
                 if keeps_string_bounds:
                     _compare_bounds(one.bound, two.bound, path)
@@ -240,6 +254,16 @@ class _Comparison:
         name = one.name if one.name.text else two.name  # one's own types have names in minimal TypeObjects too
         self.compare(one.type, two.type, f"{path}.{name}".strip("."), is_key=is_key)
 
+    def compare_extensibility(self, one: TypeFlag, two: TypeFlag, path: str) -> None:
+        if (one ^ two) & _EXTENSIBILITY & ~self._ignored:
+            raise _MismatchFound(path, f"{_extensibility(one)} for the reader, {_extensibility(two)} for the writer")
+
+    def _compare_enums(self, one: EnumObject, two: EnumObject, path: str) -> None:
+        """Fast DDS tells no extensibility of enums, which then is not compared."""
+        if one.flags & _EXTENSIBILITY and two.flags & _EXTENSIBILITY:
+            self.compare_extensibility(one.flags, two.flags, path)
+        _compare_literals(one, two, path)
+
     @property
     def ignores_names(self) -> bool:
         return self._consistency.ignore_member_names
@@ -258,8 +282,8 @@ class _Structs:
     def __init__(self, comparison: _Comparison, one: StructObject, two: StructObject, path: str) -> None:
         self._comparison = comparison
         self._path = path
-        _compare_extensibility(one.flags, two.flags, path)
-        self._is_final = TypeFlag.FINAL in one.flags
+        comparison.compare_extensibility(one.flags, two.flags, path)
+        self._is_final = TypeFlag.FINAL in one.flags | two.flags
         self._is_mutable = TypeFlag.MUTABLE in one.flags
         self._ones = comparison.members(one, path)
         self._twos = comparison.members(two, path)
@@ -335,7 +359,8 @@ class _Unions:
     def __init__(self, comparison: _Comparison, one: UnionObject, two: UnionObject, path: str) -> None:
         self._comparison = comparison
         self._one, self._two, self._path = one, two, path
-        _compare_extensibility(one.flags, two.flags, path)
+        comparison.compare_extensibility(one.flags, two.flags, path)
+        self._is_final = TypeFlag.FINAL in one.flags | two.flags
 
     def compare(self) -> None:
         one, two, path = self._one, self._two, self._path
@@ -347,7 +372,7 @@ class _Unions:
         )
         ones, default_one = _cases(one)
         twos, default_two = _cases(two)
-        if (TypeFlag.FINAL in one.flags or self._comparison.prevents_widening) and ones.keys() != twos.keys():
+        if (self._is_final or self._comparison.prevents_widening) and ones.keys() != twos.keys():
             apart = sorted(ones.keys() ^ twos.keys())
             raise _MismatchFound(path, f"the label {apart[0]} is in one of the types only")
         for label in {**ones, **twos}:  # in order
@@ -374,23 +399,16 @@ def _cases(union: UnionObject) -> tuple[dict[int, CaseObject], CaseObject | None
 # --- the others ----------------------------------------------------------------------------------------------
 
 
-def _compare_extensibility(one: TypeFlag, two: TypeFlag, path: str) -> None:
-    if (one ^ two) & _EXTENSIBILITY:
-        raise _MismatchFound(path, f"{_extensibility(one)} for the reader, {_extensibility(two)} for the writer")
-
-
 def _extensibility(flags: TypeFlag) -> str:
     if TypeFlag.MUTABLE in flags:
         return "mutable"
     return "final" if TypeFlag.FINAL in flags else "appendable" if TypeFlag.APPENDABLE in flags else "unspecified"
 
 
-def _compare_enums(one: EnumObject, two: EnumObject, path: str) -> None:
-    """§7.2.4.4.6.  Fast DDS tells no extensibility of enums, which then is not compared."""
+def _compare_literals(one: EnumObject, two: EnumObject, path: str) -> None:
+    """§7.2.4.4.6."""
     if _octets(one.bit_bound) != _octets(two.bit_bound):  # the encoding depends on it
         raise _MismatchFound(path, f"enums of {one.bit_bound} and of {two.bit_bound} bits")
-    if one.flags & _EXTENSIBILITY and two.flags & _EXTENSIBILITY:
-        _compare_extensibility(one.flags, two.flags, path)
     ones = {literal.value: literal.name for literal in one.literals}
     twos = {literal.value: literal.name for literal in two.literals}
     for value in ones.keys() & twos.keys():

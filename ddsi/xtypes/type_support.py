@@ -22,6 +22,7 @@ from .layout import Encoding, encapsulations
 from .model import Extensibility, StructType
 from .read_source import generate_reader
 from .topic_type import complete, default_representations
+from .type_object import TypeDescription, describe
 from .value_check import check_sample
 from .write_source import generate_writer
 
@@ -113,11 +114,9 @@ class TypeSupport(Generic[T]):
         return "\n\n".join(self._sources.values())
 
     @cached_property
-    def type_information(self) -> bytes:
-        """What to announce of the type: its TypeInformation, little endian (DDS-XTypes 1.3 §7.6.3.2.1, PID 0x0075)."""
-        from .type_object import describe  # most programs do not announce types
-
-        return describe(self.struct).information.encode()
+    def type_description(self) -> TypeDescription:
+        """What to announce of the type (DDS-XTypes 1.3 §7.6.3.2.1), and to answer who asks (§7.6.3.3)."""
+        return describe(self.struct)
 
     # --- samples -----------------------------------------------------------------------------------------
 

@@ -126,6 +126,8 @@ def test_the_moments_of_a_life_are_asked_in_order() -> None:
         "local_participant", "announcement", "announced", "remote_participant",
         "match DCPSPublication", "match DCPSPublication", "match DCPSSubscription", "match DCPSSubscription",
         "match DCPSParticipantMessage", "match DCPSParticipantMessage",
+        "match TypeLookupServiceRequest", "match TypeLookupServiceRequest",
+        "match TypeLookupServiceReply", "match TypeLookupServiceReply",
         "match", "unmatch", "local_endpoint_deleted", "remote_participant_lost",
     ]  # fmt: skip
 

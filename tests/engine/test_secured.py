@@ -184,7 +184,7 @@ def test_exactly_the_secure_endpoints_of_the_announcement_exist() -> None:
     assert {guid[12:] for guid in engine.local_writers} == {topic.writer_id for topic in BUILTIN_TOPICS}
     assert {guid[12:] for guid in engine.local_readers} == {topic.reader_id for topic in BUILTIN_TOPICS}
     plain = domain.node().engine
-    assert len(plain.local_writers) == len(plain.local_readers) == 3
+    assert len(plain.local_writers) == len(plain.local_readers) == 5
 
 
 def test_the_hooks_are_told_what_is_announced_in_big_endian() -> None:
@@ -476,7 +476,7 @@ def test_keys_that_come_after_a_participant_is_lost_match_nothing() -> None:
     a, b = node(domain, withholds=True), node(domain)
     domain.run(1)
     awaited = list(hooks_of(b).pending)
-    assert len(awaited) == 8, "both endpoints of the four secure topics with keys of their own"
+    assert len(awaited) == 12, "both endpoints of the six secure topics with keys of their own"
     a.close()
     domain.network.unplug(a.host)
     assert domain.run_until(lambda: not b.engine.participants, 300)

@@ -96,7 +96,10 @@ class Stranger:
 
     def first_heartbeats(self) -> bytes:
         """The builtin writers say that they are there, so that what they send is in step."""
-        writers = (ids.SEDP_PUBLICATIONS_WRITER, ids.SEDP_SUBSCRIPTIONS_WRITER, ids.PARTICIPANT_MESSAGE_WRITER)
+        writers = (
+            *(ids.SEDP_PUBLICATIONS_WRITER, ids.SEDP_SUBSCRIPTIONS_WRITER, ids.PARTICIPANT_MESSAGE_WRITER),
+            *(ids.TYPE_LOOKUP_REQUEST_WRITER, ids.TYPE_LOOKUP_REPLY_WRITER),
+        )
         beats = [Heartbeat(EntityId.UNKNOWN, writer, 1, 0, 1, final=True).encode() for writer in writers]
         return self.message(*beats)
 

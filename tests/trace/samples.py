@@ -7,7 +7,7 @@ from ddsi.structure.guid import Guid, GuidPrefix
 from ddsi.structure.locator import Locator
 from ddsi.trace import events as e
 from ddsi.trace.event import TraceEvent
-from ddsi.trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason
+from ddsi.trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, TypeStep
 
 A = GuidPrefix(bytes.fromhex("01dd0000000000000000000a"))
 B = GuidPrefix(bytes.fromhex("01dd0000000000000000000b"))
@@ -34,6 +34,7 @@ SAMPLES: list[TraceEvent] = [
     e.Matched(1.0, A, WRITER, READER, "Square"),
     e.Unmatched(1.0, A, WRITER, READER, "Square", LossReason.QOS_CHANGED),
     e.Incompatible(1.0, A, WRITER, READER, "Square", "reliability", "BestEffort()", "Reliable()"),
+    e.TypesCompared(1.0, A, WRITER, READER, "Square", TypeStep.ASSIGNABLE, "another, and it fits"),
     e.TopicInconsistent(1.0, A, WRITER, READER, "Square", "ShapeType", "OtherType"),
     e.ChangeWritten(1.0, A, WRITER, 1 << 60, ChangeKind.NOT_ALIVE_DISPOSED, 24),
     e.SampleDelivered(1.0, B, READER, WRITER, 3),

@@ -27,6 +27,7 @@ lost reader Square@B: goodbye
 matched writer Square@A with reader Square@B
 unmatched Square@A from Square@B: qos_changed
 no match of Square@A and Square@B: reliability offered BestEffort(), requested Reliable()
+types of Square@A and Square@B: assignable (another, and it fits)
 no match of Square@A and Square@B: type ShapeType here, OtherType there
 disposed Square #1152921504606846976 (24 octets)
 delivered Square #3 of A

@@ -8,7 +8,7 @@ import pytest
 
 from ddsi.trace.event import SCHEMA_NAME, SCHEMA_VERSION, Category
 from ddsi.trace.events import EVENT_TYPES
-from ddsi.trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, SecurityStep
+from ddsi.trace.reasons import DropReason, LossReason, RejectReason, SampleLossReason, SecurityStep, TypeStep
 
 SCHEMA = (Path(__file__).parents[2] / "docs" / "trace.md").read_text(encoding="utf-8")
 
@@ -50,6 +50,7 @@ def test_every_event_stands_under_its_category() -> None:
         ("Why samples are lost", SampleLossReason),
         ("Why a sample was rejected", RejectReason),
         ("What security decided", SecurityStep),
+        ("What became of types that are not plainly the same", TypeStep),
     ],
 )
 def test_every_reason_stands_in_the_schema(title: str, reasons: type[DropReason]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from .identifiers import (
     ArrayIdentifier,
@@ -23,13 +23,18 @@ from .objects import (
     UnionObject,
 )
 
-__all__ = ["hashes_in", "references"]
+__all__ = ["hashed_only", "hashes_in", "references"]
 
 
 def references(type_object: TypeObject) -> Iterator[HashedIdentifier]:
     """In the order in which it names them; one that is named twice comes twice."""
     for identifier in _named(type_object):
         yield from hashes_in(identifier)
+
+
+def hashed_only(identifiers: Iterable[TypeIdentifier]) -> list[HashedIdentifier]:
+    """Those that stand for a TypeObject."""
+    return [identifier for identifier in identifiers if isinstance(identifier, HashedIdentifier)]
 
 
 def hashes_in(identifier: TypeIdentifier) -> Iterator[HashedIdentifier]:
