@@ -38,12 +38,14 @@ __all__ = [
     "EnumType",
     "Extensibility",
     "IdlType",
+    "Limits",
     "MapType",
     "Member",
     "Primitive",
     "SequenceType",
     "String",
     "StructType",
+    "TryConstruct",
     "Typedefs",
     "UnionType",
     "nested_structs",
@@ -57,6 +59,35 @@ class Extensibility(enum.Enum):
     FINAL = "final"
     APPENDABLE = "appendable"
     MUTABLE = "mutable"
+
+
+class TryConstruct(enum.Enum):
+    """What becomes of a received value that its member cannot hold (DDS-XTypes 1.3 §7.2.4.3): a string, sequence or map
+    that exceeds the bound, a number that is no literal of the enum."""
+
+    DISCARD = "discard"
+    """What holds the value is discarded with it, in the end the sample."""
+    USE_DEFAULT = "use_default"
+    """The member has its default."""
+    TRIM = "trim"
+    """The first of it, as much as the bound allows; what has no bound is discarded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The lowest and the highest number that a member may be; None where there is none (IDL ``@range``)."""
+
+    minimum: float | None = None
+    maximum: float | None = None
+
+    def allow(self, number: Any) -> bool:
+        """False for NaN, too."""
+        return (self.minimum is None or number >= self.minimum) and (self.maximum is None or number <= self.maximum)
+
+    def __str__(self) -> str:
+        if self.maximum is None:
+            return f"{self.minimum} or more"
+        return f"{self.maximum} at most" if self.minimum is None else f"{self.minimum} to {self.maximum}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,6 +312,9 @@ class Member:
     typedefs: Typedefs | None = None
     hash_name: str | None = None
     """What ``@hashid`` was given; empty where it stood alone, None where it was not there."""
+    try_construct: TryConstruct = TryConstruct.DISCARD
+    limits: Limits | None = None
+    unit: str | None = None
 
     @property
     def name_in_idl(self) -> str:
@@ -379,6 +413,7 @@ class UnionType:
     """
 
     __slots__ = (
+        "_chosen",
         "_found",
         "_resolve",
         "_selection",
@@ -407,6 +442,7 @@ class UnionType:
         self._resolve = resolve
         self._found: tuple[Member, tuple[Case, ...]] | None = None
         self._selection: dict[Any, int] | None = None
+        self._chosen: tuple[dict[Any, Case], Case | None] | None = None
 
     @property
     def discriminator(self) -> Member:
@@ -435,8 +471,11 @@ class UnionType:
 
     def case_of(self, discriminator: Any) -> Case | None:
         """The member that a discriminator selects."""
-        index = self.selection.get(discriminator, self.default_index)
-        return None if index < 0 else self.cases[index]
+        if self._chosen is None:
+            default = self.cases[self.default_index] if self.default_index >= 0 else None
+            self._chosen = {label: self.cases[index] for label, index in self.selection.items()}, default
+        cases, default = self._chosen
+        return cases.get(discriminator, default)
 
     def _resolved(self) -> tuple[Member, tuple[Case, ...]]:
         if self._found is None:
