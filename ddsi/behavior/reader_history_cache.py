@@ -500,6 +500,19 @@ class ReaderHistoryCache:
                 return key
         return None
 
+    def peek(
+        self,
+        *,
+        sample_states: int,
+        view_states: int,
+        instance_states: int,
+        instance: bytes | None = None,
+        selector: SampleSelector | None = None,
+    ) -> list[SampleInfo]:
+        """The samples that :meth:`take` would take, untouched."""
+        chosen = self._select(None, sample_states, view_states, instance_states, instance, selector, touch=False)
+        return [info for info, _ in chosen]
+
     def matches(
         self, *, sample_states: int, view_states: int, instance_states: int, selector: SampleSelector | None = None
     ) -> bool:

@@ -7,7 +7,7 @@ becomes a sample is theirs.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast
 
 import trio
 
@@ -96,11 +96,14 @@ class SampleReader(Entity, Generic[T]):
         self._check_open()
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.seen()
+        sort_key = condition._sort_key if condition is not None else None
+        if sort_key is not None and max_samples is not None:
+            selector = self._first_of_order(sort_key, max_samples, states, instance, selector)
         taken = self._history.take(max_samples, **states, instance=instance, selector=selector)
         samples = [sample for info, change in taken if (sample := self._sample(info, change)) is not None]
         self._drop_undecodable()
         self._after_taking()
-        return samples
+        return samples if sort_key is None else _in_order(samples, sort_key)
 
     def read(
         self,
@@ -116,10 +119,13 @@ class SampleReader(Entity, Generic[T]):
         self._check_open()
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.seen()
+        sort_key = condition._sort_key if condition is not None else None
+        if sort_key is not None and max_samples is not None:
+            selector = self._first_of_order(sort_key, max_samples, states, instance, selector)
         found = self._history.read(max_samples, **states, instance=instance, selector=selector)
         samples = [sample for info, change in found if (sample := self._sample(info, change)) is not None]
         self._drop_undecodable()
-        return samples
+        return samples if sort_key is None else _in_order(samples, sort_key)
 
     def take_next_instance(
         self,
@@ -226,11 +232,30 @@ class SampleReader(Entity, Generic[T]):
             sample_states &= condition.sample_states
             view_states &= condition.view_states
             instance_states &= condition.instance_states
-            query = condition.query
-            if query is not None:
-                selector = self._selector(query)
+            selector = condition._selector(self)
         states = {"sample_states": sample_states, "view_states": view_states, "instance_states": instance_states}
         return states, selector
+
+    def _matches(self, condition: ReadCondition) -> bool:
+        """Is there such a sample?"""
+        states, selector = self._selection(condition, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
+        return self._history.matches(selector=selector, **states)
+
+    def _first_of_order(
+        self,
+        sort_key: Callable[[T], Any],
+        count: int,
+        states: dict[str, int],
+        instance: bytes | None,
+        selector: SampleSelector | None,
+    ) -> SampleSelector:
+        """Selects of the samples that are wanted the first so many in their order."""
+        found = self._history.peek(**states, instance=instance, selector=selector)
+        samples = [(info, self._sample(info, info.change)) for info in found if info.change is not None]
+        decoded = [(sort_key(sample.data), info) for info, sample in samples if sample is not None]
+        decoded.sort(key=lambda entry: entry[0])
+        chosen = {id(info) for _, info in decoded[:count]}
+        return lambda info: id(info) in chosen
 
     def _selector(self, query: Callable[[T], bool]) -> SampleSelector:
         def selects(info: SampleInfo) -> bool:
@@ -239,3 +264,14 @@ class SampleReader(Entity, Generic[T]):
             return sample is not None and bool(query(sample.data))
 
         return selects
+
+
+def _in_order(samples: list[Sample[T]], sort_key: Callable[[T], Any]) -> list[Sample[T]]:
+    """Sorted, with the ranks that samples have in this order: how many of the same instance follow."""
+    samples.sort(key=lambda sample: sort_key(sample.data))
+    following: dict[bytes, int] = {}
+    for sample in reversed(samples):
+        handle = sample.info.instance_handle
+        sample.info.sample_rank = following.get(handle, 0)
+        following[handle] = sample.info.sample_rank + 1
+    return samples

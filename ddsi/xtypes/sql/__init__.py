@@ -6,7 +6,7 @@ and the tree, checked against a type, closures over it.
 """
 
 from .field_path import FieldPath
-from .filter_expression import FilterExpression
+from .filter_expression import FilterExpression, checked_parameters
 from .parser import parse_filter, parse_query, parse_topic_expression
 from .query_expression import QueryExpression
 from .sample_filters import SampleFilters
@@ -19,6 +19,7 @@ __all__ = [
     "QueryExpression",
     "SampleFilters",
     "TopicExpression",
+    "checked_parameters",
     "parse_filter",
     "parse_query",
     "parse_topic_expression",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..model import StructType
-from .evaluation import Predicate, compile_condition
+from .evaluation import Predicate, compile_condition, fields_of
 from .field_path import FieldPath
 from .parser import parse_query
 
@@ -23,6 +23,9 @@ class QueryExpression:
         query = parse_query(text)
         self._condition = query.condition
         self._order = tuple(FieldPath.find(struct, field, text) for field in query.order)
+        fields = fields_of(query.condition) if query.condition is not None else []
+        self.is_about_key = bool(fields) and all(FieldPath.find(struct, field, text).is_key for field in fields)
+        """Does what holds for one sample hold for its instance, and for its end?"""
 
     @property
     def is_ordered(self) -> bool:
