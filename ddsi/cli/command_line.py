@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from importlib import import_module, metadata
-from typing import NoReturn, Protocol, cast
+from typing import Any, NoReturn, Protocol, cast
 
 from ..structure.errors import DdsError
 from ..transport.wall_clock import wall_clock
@@ -19,6 +19,9 @@ ENTRY_POINT_GROUP = "ddsi.cli"
 
 _COMMANDS = {
     "ls": "list participants, topics and endpoints of a domain",
+    "typeof": "show the IDL of a topic's type, as those who use it announce it",
+    "echo": "print the samples of a topic, of whatever type, as they come",
+    "pub": "write samples to a topic, of whatever type",
     "why": "say why endpoints of a topic do not match, and what to do",
     "shapes": "publish or subscribe the shapes of the OMG's demo, drawn in the terminal",
     "trace": "watch or record what goes over the wire, or draw a recording",
@@ -48,7 +51,21 @@ class Command(Protocol):
 
 
 class _Parser(argparse.ArgumentParser):
-    """One sentence for a mistake, instead of the usage and a sentence."""
+    """One sentence for a mistake, instead of the usage and a sentence.
+
+    ``is_intermixed``: options may stand between arguments too, as in ``ddsi pub TOPIC -n 3 x=1``.
+    """
+
+    is_intermixed = False
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        if not self.is_intermixed:
+            return super().parse_known_args(args, namespace)
+        self.is_intermixed = False  # what follows calls this
+        try:
+            return self.parse_known_intermixed_args(args, namespace)
+        finally:
+            self.is_intermixed = True
 
     def error(self, message: str) -> NoReturn:
         self.exit(ExitStatus.USAGE, f"{self.prog}: {message}; see {self.prog} --help\n")
@@ -107,6 +124,7 @@ def _parse(words: Sequence[str]) -> tuple[Command, argparse.Namespace]:
 def _add(subparsers: argparse._SubParsersAction[_Parser], name: str, command: Command) -> None:
     subparser = subparsers.add_parser(name, help=command.SUMMARY, description=_sentence(command.SUMMARY))
     command.add_arguments(subparser)
+    subparser.is_intermixed = getattr(command, "IS_INTERMIXED", False)
 
 
 def _add_foreign(subparsers: argparse._SubParsersAction[_Parser], chosen: str) -> Command | None:

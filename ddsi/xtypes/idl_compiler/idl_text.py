@@ -321,6 +321,8 @@ class _Writer:
 
     def _declarator(self, member: Member, owner: str) -> str:
         name = member.name_in_idl
+        if not _NAME.fullmatch(name):
+            raise BadParameter(f"{owner}: the member {name!r} has no name in IDL; give it one by idl.name")
         return self._declared(member.type, member.typedefs, _escaped(name), f"{owner}_{name}")
 
     def _declared(self, type_: IdlType, aliases: Typedefs | None, name: str, where: str) -> str:
