@@ -43,6 +43,33 @@ def _mixed(**sizes: tuple[int, ...]) -> list[str]:
     return [line for row in rows for line in row]
 
 
+def _ordered(*colors: str) -> list[str]:
+    """Reads, each as the first letters of the colours that it hands out."""
+    return [
+        line
+        for read in colors
+        for line in (
+            "Reading with ordered access, iteration 1",
+            *(line for color in read for line in _sizes(20, color=color)),
+        )
+    ][1:]
+
+
+def _sets(*reads: tuple[int, ...], topics: int = 3) -> list[str]:
+    """Reads, each of samples of these sizes from every instance of every topic."""
+    names = ["Square", "Square1", "Square2"][:topics]
+    return [
+        line
+        for sizes in reads
+        for line in (
+            "Reading coherent sets, iteration 1",
+            *(f"{topic} {color} 010 020 [{size}]" for topic in names for color in "ABCD" for size in sizes),
+        )
+    ][1:]
+
+
+FIVE_SETS = [tuple(range(number, number + 3)) for number in range(1, 16, 3)]
+
 GONE = "Square     {:<10} NOT_ALIVE_NO_WRITERS_INSTANCE_STATE"
 DISPOSED = "Square     {:<10} NOT_ALIVE_DISPOSED_INSTANCE_STATE"
 LATE = "on_requested_deadline_missed() topic: 'Square'  type: 'ShapeType' : (total = 1, change = 1)"
@@ -88,6 +115,19 @@ JUDGED: list[tuple[Check, list[str], Code]] = [
     (checks.groups_of_two_or_three, _sizes(1, 2, 3, 4, 6, 7, 11), Code.DATA_NOT_CORRECT),
     (checks.groups_of_two_or_three, _sizes(1, 2, 6, 11, 12), Code.DATA_NOT_CORRECT),
     (checks.groups_of_two_or_three, _sizes(*range(1, 30)), Code.DATA_NOT_CORRECT),
+    (checks.by_instance_or_in_order, _ordered(*["AAABBBCCC"] * 5), Code.ORDERED_ACCESS_INSTANCE),
+    (checks.by_instance_or_in_order, _ordered(*["ABCABCABC"] * 5), Code.ORDERED_ACCESS_TOPIC),
+    (checks.by_instance_or_in_order, _ordered("ABCABCABC", "AAABBBCCC", *["ABCABCABC"] * 3), Code.ORDERED_ACCESS_TOPIC),
+    (checks.by_instance_or_in_order, _ordered(*["ABCABCABC", "AAABBBCCC", "AAABBBCCC"] * 2), Code.DATA_NOT_CORRECT),
+    (checks.by_instance_or_in_order, _ordered(*["ABC"] * 11), Code.DATA_NOT_RECEIVED),
+    (checks.by_instance_or_in_order, _ordered(*["ABCABCABC"] * 2), Code.DATA_NOT_RECEIVED),
+    (checks.whole_sets, _sets(*FIVE_SETS), Code.OK),
+    (checks.whole_sets, _sets((1, 2, 3), (4, 5, 6, 7, 8, 9), (10, 11, 12), (13, 14, 15)), Code.OK),
+    (checks.whole_sets, _sets((3,), *[tuple(size + 3 for size in sizes) for sizes in FIVE_SETS]), Code.OK),
+    (checks.whole_sets, _sets((1, 2, 3), (4, 5), (6,), *FIVE_SETS[2:]), Code.DATA_NOT_CORRECT),
+    (checks.whole_sets, _sets(*FIVE_SETS[:2], *FIVE_SETS[1:]), Code.DATA_NOT_CORRECT),
+    (checks.whole_sets, _sets(*FIVE_SETS, topics=2), Code.DATA_NOT_RECEIVED),
+    (checks.whole_sets, _sets(*FIVE_SETS[:4]), Code.DATA_NOT_RECEIVED),
 ]
 COUNT = 10
 
@@ -150,6 +190,6 @@ def test_a_sample_is_told_from_other_lines() -> None:
 def test_each_case_begins_with_publishers_and_expects_a_code_of_each_program() -> None:
     for case in CASES:
         roles = "".join(options[1] for options in case.programs)
-        assert roles.lstrip("P") == "S", case.name
+        assert re.fullmatch("P+S+", roles), case.name
         assert len(case.expected) == len(case.programs), case.name
-    assert len({case.name for case in CASES}) == len(CASES) == 65
+    assert len({case.name for case in CASES}) == len(CASES) == 105

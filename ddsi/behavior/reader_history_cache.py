@@ -519,6 +519,13 @@ class ReaderHistoryCache:
         """Is there any such sample?"""
         return bool(self._select(1, sample_states, view_states, instance_states, None, selector, touch=False))
 
+    def matching(
+        self, *, sample_states: int, view_states: int, instance_states: int, selector: SampleSelector | None = None
+    ) -> list[SampleInfo]:
+        """What stands beside such samples, as it is in the cache; nothing counts as looked at."""
+        chosen = self._select(None, sample_states, view_states, instance_states, None, selector, touch=False)
+        return [info for info, _ in chosen]
+
     def _select(
         self,
         max_samples: int | None,

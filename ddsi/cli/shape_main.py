@@ -1,8 +1,8 @@
 """``ddsi-shape-main``: the program that the OMG's interoperability suite for DDS-RTPS runs, over this stack.
 
 Its options, its lines and its exit statuses are those of every vendor's ``shape_main``
-(https://github.com/omg-dds/dds-rtps), so that the suite's scripts drive it against any of them.  What the stack cannot
-do is answered with a line that says "not supported".  The network comes from ``DDSI_URI``; there is no option for it.
+(https://github.com/omg-dds/dds-rtps), so that the suite's scripts drive it against any of them.  The network comes from
+``DDSI_URI``; there is no option for it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..dcps import DomainParticipant, Topic
 from ..structure.errors import DdsError
 from .runner import abandon_output
 from .shape_main_options import OptionError, ShapeMainOptions, option_parser, parse_options, warnings
-from .shape_main_qos import participant_config, unsupported
+from .shape_main_qos import participant_config
 from .shape_main_roles import PublishingRole, Role, SubscribingRole
 from .shape_types import Shape
 
@@ -107,9 +107,6 @@ def _create(role: Role, participant: DomainParticipant, nursery: trio.Nursery) -
         for name in role.options.topics():
             print(f"Create topic: {name}")
             topics.append(Topic(participant, name, role.form.type))
-        if (missing := unsupported(role.options)) is not None:
-            print(missing)
-            return ShapeMainStatus.INITIALIZING
         role.create(topics, participant, nursery)
     except DdsError as error:
         print(f"failed to create: {error}")

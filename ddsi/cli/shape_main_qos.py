@@ -1,4 +1,4 @@
-"""From the options of ``ddsi-shape-main`` to QoS and configuration, and what of them the stack cannot do."""
+"""From the options of ``ddsi-shape-main`` to QoS and configuration."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from ..config import Config
 from ..structure.qos import Qos
 from ..structure.qos_policies import (
+    AccessScope,
     BestEffort,
     DataRepresentation,
     Deadline,
@@ -18,6 +19,7 @@ from ..structure.qos_policies import (
     OwnershipStrength,
     Partition,
     Persistent,
+    Presentation,
     Reliable,
     Shared,
     TimeBasedFilter,
@@ -28,7 +30,7 @@ from ..structure.qos_policies import (
 )
 from .shape_main_options import ShapeMainOptions
 
-__all__ = ["content_filter", "endpoint_qos", "group_qos", "participant_config", "unsupported"]
+__all__ = ["content_filter", "endpoint_qos", "group_qos", "participant_config"]
 
 _DURABILITIES: dict[str, type[Durability]] = {
     "v": Volatile,
@@ -36,21 +38,9 @@ _DURABILITIES: dict[str, type[Durability]] = {
     "t": Transient,
     "p": Persistent,
 }
+_SCOPES = {"i": AccessScope.INSTANCE, "t": AccessScope.TOPIC, "g": AccessScope.GROUP}
 # What one UDP datagram holds, as Config wants it; the engine lowers it further to what fits beside headers.
 _LARGEST_DATAGRAM = 65507
-
-
-def unsupported(options: ShapeMainOptions) -> str | None:
-    """The first thing asked for that this stack does not do, in the words that the suite looks for; None if all can be.
-
-    Better said than done half: the suite tells "cannot" from "does it wrong".
-    """
-    features = (
-        ("Presentation Coherent Access", options.is_coherent),
-        ("Presentation Ordered Access", options.is_ordered),
-        ("Presentation Access Scope", options.access_scope in ("t", "g")),
-    )
-    return next((f"{feature} = not supported" for feature, is_wanted in features if is_wanted), None)
 
 
 def content_filter(options: ShapeMainOptions) -> tuple[str, tuple[str, ...]] | None:
@@ -75,7 +65,11 @@ def participant_config(options: ShapeMainOptions, config: Config) -> Config:
 
 def group_qos(options: ShapeMainOptions) -> Qos:
     """Of the publisher or subscriber."""
-    return Qos(partition=Partition(options.partition)) if options.partition is not None else Qos()
+    qos = Qos(partition=Partition(options.partition)) if options.partition is not None else Qos()
+    if options.access_scope is not None or options.is_coherent or options.is_ordered:
+        scope = _SCOPES[options.access_scope or "i"]
+        qos |= Qos(presentation=Presentation(scope, options.is_coherent, options.is_ordered))
+    return qos
 
 
 def endpoint_qos(options: ShapeMainOptions) -> Qos:

@@ -11,6 +11,7 @@ import trio
 
 from ..dcps import ContentFilteredTopic, DataReader, DataWriter, DomainParticipant, Publisher, Sample, Subscriber, Topic
 from ..structure.errors import BadParameter, DdsTimeout
+from ..structure.sample_info import ANY_SAMPLE_STATE, SampleState
 from .shape_main_lines import sample_line, state_line, status_line
 from .shape_main_options import ShapeMainOptions
 from .shape_main_qos import content_filter, endpoint_qos, group_qos
@@ -67,7 +68,11 @@ class Role:
 
 
 class PublishingRole(Role):
-    """Writes every instance on every topic, all at the same place and of the same size."""
+    """Writes every instance on every topic, all at the same place and of the same size.
+
+    With coherent access each round is a set.  It may hold several samples of each instance, each one larger than the
+    one before if sizes grow.
+    """
 
     def __init__(self, options: ShapeMainOptions, end: trio.Event) -> None:
         super().__init__(options, end)
@@ -75,7 +80,7 @@ class PublishingRole(Role):
         self._shape = MovingShape(options.size, random.Random())
 
     def create(self, topics: list[Topic[Shape]], participant: DomainParticipant, nursery: trio.Nursery) -> None:
-        publisher = Publisher(participant, group_qos(self.options))
+        self._publisher = publisher = Publisher(participant, group_qos(self.options))
         for topic in topics:
             print(f"Create writer for topic: {topic.name} color: {self.options.colors()[0]}")
             writer = DataWriter(publisher, topic, endpoint_qos(self.options))
@@ -87,13 +92,29 @@ class PublishingRole(Role):
         return self.options.write_period_ms / 1000
 
     async def play_round(self, number: int) -> None:
-        shape = self._shape
+        shape, options = self._shape, self.options
         shape.move()
-        if self.options.size == 0:
-            shape.size = (shape.size % self.options.size_modulo if self.options.size_modulo else shape.size) + 1
+        sizes = [self._next_size() for _ in range(options.coherent_sample_count or 1)]
+        if not options.is_coherent:
+            await self._write_round(sizes)
+            return
+        print("Started Coherent Set")
+        with self._publisher.coherent_changes():
+            await self._write_round(sizes)
+        print("Finished Coherent Set")
+
+    def _next_size(self) -> int:
+        shape, options = self._shape, self.options
+        if options.size == 0:
+            shape.size = (shape.size % options.size_modulo if options.size_modulo else shape.size) + 1
+        return shape.size
+
+    async def _write_round(self, sizes: list[int]) -> None:
+        shape = self._shape
         for writer in self.writers:
             for color in self.options.colors():
-                await self._write(writer, self.form.sample(color, shape.x, shape.y, shape.size))
+                for size in sizes:
+                    await self._write(writer, self.form.sample(color, shape.x, shape.y, size))
 
     async def _write(self, writer: DataWriter[Shape], sample: Shape) -> None:
         try:
@@ -124,14 +145,14 @@ class PublishingRole(Role):
 
 
 class SubscribingRole(Role):
-    """Prints, each period, all samples that are there."""
+    """Prints, each period, all samples that are there; with coherent or ordered access it says first that it looks."""
 
     def __init__(self, options: ShapeMainOptions, end: trio.Event) -> None:
         super().__init__(options, end)
         self.readers: list[DataReader[Shape]] = []
 
     def create(self, topics: list[Topic[Shape]], participant: DomainParticipant, nursery: trio.Nursery) -> None:
-        subscriber = Subscriber(participant, group_qos(self.options))
+        self._subscriber = subscriber = Subscriber(participant, group_qos(self.options))
         for topic in topics:
             wanted = self._filtered(participant, topic)
             print(f"Create reader for topic: {wanted.name}")
@@ -157,12 +178,28 @@ class SubscribingRole(Role):
         return self.options.read_period_ms / 1000
 
     async def play_round(self, number: int) -> None:
-        for reader in self.readers:
-            samples = reader.read() if self.options.reads else reader.take()
-            if self.options.by_instance:
-                samples.sort(key=lambda sample: sample.info.instance_handle)
-            for sample in samples:
-                self._print(reader.topic.name, sample)
+        options = self.options
+        if options.is_coherent:
+            print(f"Reading coherent sets, iteration {number}")
+        if options.is_ordered:
+            print(f"Reading with ordered access, iteration {number}")
+        with self._subscriber.access():
+            if options.is_ordered and options.access_scope == "g":
+                # One sample of each entry, in their order.
+                unread = SampleState.NOT_READ if options.reads else ANY_SAMPLE_STATE
+                for reader in self._subscriber.get_datareaders(sample_states=unread):
+                    self._print_from(reader, sample_states=unread)
+            else:
+                for reader in self.readers:
+                    self._print_from(reader)
+
+    def _print_from(self, reader: DataReader[Shape], *, sample_states: int = ANY_SAMPLE_STATE) -> None:
+        look = reader.read if self.options.reads else reader.take
+        samples = look(sample_states=sample_states)
+        if self.options.by_instance:
+            samples.sort(key=lambda sample: sample.info.instance_handle)
+        for sample in samples:
+            self._print(reader.topic.name, sample)
 
     def _print(self, topic: str, sample: Sample[Shape]) -> None:
         if sample.info.valid_data:

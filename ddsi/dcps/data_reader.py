@@ -13,10 +13,10 @@ from ..engine import KeyCodec, LocalReader, publication_data
 from ..structure.builtin_topic_data import PublicationBuiltinTopicData
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import ContentFilterProperty
-from ..structure.errors import BadParameter, DdsTimeout, MalformedSample
+from ..structure.errors import BadParameter, DdsTimeout, MalformedSample, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, reader_qos
-from ..structure.qos_policies import DataRepresentation, DataRepresentationId
+from ..structure.qos_policies import AccessScope, DataRepresentation, DataRepresentationId
 from ..structure.sample_info import SampleInfo
 from ..structure.status import (
     DataAvailable,
@@ -97,6 +97,7 @@ class DataReader(SampleReader[T], Endpoint):
             keys=_key_codec(topic) if support.is_keyed else None,
             content_filter=(filtered._announced, filtered._evaluate) if filtered is not None else None,
             types=support.type_description if self._pump.engine.config.announce_types else None,
+            group=parent._group if isinstance(parent, Subscriber) else None,
         )
         history = self._reader.history
         assert history is not None
@@ -214,6 +215,18 @@ class DataReader(SampleReader[T], Endpoint):
         if len(change.payload) >= 4:
             return self._deserialize_key(change.payload)
         return self._topic.type_support.sample_from_key(info.instance_handle)
+
+    def _begin_reading(self, max_samples: int | None) -> int | None:
+        max_samples = super()._begin_reading(max_samples)
+        return self._parent._limit_of(self, max_samples) if isinstance(self._parent, Subscriber) else max_samples
+
+    def _check_iterable(self) -> None:
+        scope = self._endpoint_qos.presentation.access_scope
+        if scope is AccessScope.GROUP and isinstance(self._parent, Subscriber):
+            raise PreconditionNotMet(
+                f"{self!r} has access scope GROUP: take() within `with subscriber.access():`, as what it shows has to "
+                "fit what the subscriber's other readers show"
+            )
 
     def _after_taking(self) -> None:
         """There is room again: a reliable writer whose samples had to wait may go on."""

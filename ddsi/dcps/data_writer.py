@@ -86,6 +86,7 @@ class DataWriter(Endpoint, Generic[T]):
             is_keyed=support.is_keyed,
             compile_filter=filter_compiler(support),
             types=support.type_description if self._pump.engine.config.announce_types else None,
+            group=parent._group if isinstance(parent, Publisher) else None,
         )
         self._hides_keys = support.is_keyed and self._writer.protection.key_protected
         self._key_hashes: dict[bytes, bytes] = {}

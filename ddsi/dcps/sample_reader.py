@@ -66,6 +66,7 @@ class SampleReader(Entity, Generic[T]):
         Raises NotAllowedBySecurity when it was closed because its participant's rights have ended.
         """
         await self._pump.checkpoint(self._pump.now())
+        self._check_iterable()
         while not self._is_closed:
             taken = self._history.take_next()
             if taken is not None:
@@ -88,12 +89,15 @@ class SampleReader(Entity, Generic[T]):
         instance_states: int = ANY_INSTANCE_STATE,
         instance: bytes | None = None,
     ) -> list[Sample[T]]:
-        """Samples that are here now, oldest first, removed from the reader; never waits.
+        """Samples that are here now, removed from the reader; never waits.
 
-        ``max_samples``: at most so many.  Masks select by state, ``condition`` brings masks of its own,
-        ``instance`` (an ``info.instance_handle``) selects one instance.  Raises AlreadyDeleted.
+        ``max_samples``: at most so many, those that came first.  Masks select by state, ``condition`` brings masks of
+        its own, ``instance`` (an ``info.instance_handle``) selects one instance.  The samples of an instance follow
+        each other, oldest first; with ordered access to the whole topic (``Presentation``) all of them stand as they
+        came.  With access scope GROUP it is called within ``subscriber.access()``, and returns one sample at most where
+        access is ordered.  Raises PreconditionNotMet, AlreadyDeleted.
         """
-        self._check_open()
+        max_samples = self._begin_reading(max_samples)
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.seen()
         sort_key = condition._sort_key if condition is not None else None
@@ -116,7 +120,7 @@ class SampleReader(Entity, Generic[T]):
         instance: bytes | None = None,
     ) -> list[Sample[T]]:
         """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
-        self._check_open()
+        max_samples = self._begin_reading(max_samples)
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.seen()
         sort_key = condition._sort_key if condition is not None else None
@@ -186,6 +190,19 @@ class SampleReader(Entity, Generic[T]):
         self._drop_undecodable()
 
     # --- inside ------------------------------------------------------------------------------------------
+
+    def _begin_reading(self, max_samples: int | None) -> int | None:
+        """May the application look now, and at how many samples at most?"""
+        self._check_open()
+        return max_samples
+
+    def _has_unread(self) -> bool:
+        return self._history.matches(
+            sample_states=SampleState.NOT_READ, view_states=ANY_VIEW_STATE, instance_states=ANY_INSTANCE_STATE
+        )
+
+    def _check_iterable(self) -> None:
+        """May samples be taken one after the other as they come?"""
 
     def _next_instance(
         self, previous: bytes | None, condition: ReadCondition | None, samples: int, views: int, instances: int

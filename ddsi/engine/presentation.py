@@ -45,8 +45,10 @@ class Presentation:
         return PublisherGroup(self._engine.new_guid(EntityKind.WRITER_GROUP).entity_id)
 
     def writer_created(self, writer: LocalWriter, group: PublisherGroup) -> None:
-        writer.group = group
-        group.writer_added(writer.guid, writer.data.qos.presentation)
+        policy = writer.data.qos.presentation
+        if policy.coherent_access or policy.access_scope is AccessScope.GROUP:  # others are spared the question
+            writer.group = group
+            group.writer_added(writer.guid, policy)
 
     def writer_gone(self, writer: LocalWriter) -> None:
         if writer.group is not None:

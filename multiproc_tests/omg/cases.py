@@ -1,11 +1,10 @@
-"""The suite's cases: for each the options of every program, in the order of their start, and the codes expected.
-
-Those on ordered access and coherent sets are not here yet: nobody in the catalogue could play them.
-"""
+"""The suite's cases: for each the options of every program, in the order of their start, and the codes expected."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 from . import checks
 from .checks import Check
@@ -18,6 +17,7 @@ INCOMPATIBLE = (Code.INCOMPATIBLE_QOS, Code.INCOMPATIBLE_QOS)
 APART = (Code.READER_NOT_MATCHED, Code.DATA_NOT_RECEIVED)
 LATE = (Code.DEADLINE_MISSED, Code.DEADLINE_MISSED)
 FROM_ONE = (Code.OK, Code.OK, Code.RECEIVING_FROM_ONE)
+BY_INSTANCE_AND_IN_ORDER = (Code.OK, Code.ORDERED_ACCESS_INSTANCE, Code.ORDERED_ACCESS_TOPIC)
 FROM_BOTH = (Code.OK, Code.OK, Code.RECEIVING_FROM_BOTH)
 
 _DEFAULT_TOPIC = "-t Square"
@@ -44,6 +44,64 @@ class SuiteCase:
 def _case(name: str, *programs: str, expected: tuple[Code, ...] = OK, check: Check = checks.any_sample) -> SuiteCase:
     complete = tuple(words if "-t " in words else f"{words} {_DEFAULT_TOPIC}" for words in programs)
     return SuiteCase(name, complete, expected, check)
+
+
+_SCOPES = "itg"
+# Of the offered and the requested access scope, in the suite's order; a narrower one than requested does not do.
+_SCOPE_PAIRS = tuple((offered, requested) for offered in _SCOPES for requested in _SCOPES)
+_FITTING_PAIRS = tuple(pair for pair in _SCOPE_PAIRS if _SCOPES.index(pair[0]) >= _SCOPES.index(pair[1]))
+
+
+def _access(kind: str, offered: str, requested: str, *, history: str = "") -> tuple[str, str]:
+    """The options of a publisher and a subscriber that want coherent or ordered access in such scopes."""
+    return (
+        f"-P -r -k 0{history} --{kind} --access-scope {offered}",
+        f"-S -r -k 0{history} --{kind} --access-scope {requested}",
+    )
+
+
+def _ordered_cases() -> Iterator[SuiteCase]:
+    numbers = count()
+    for pair in _SCOPE_PAIRS:
+        expected = OK if pair in _FITTING_PAIRS else INCOMPATIBLE
+        yield _case(f"OrderedAccess_{next(numbers)}", *_access("ordered", *pair), expected=expected)
+    publisher, subscriber = "-P -r -k 0 --access-scope t", _access("ordered", "t", "t")[1]
+    yield _case(f"OrderedAccess_{next(numbers)}", publisher, subscriber, expected=INCOMPATIBLE)
+    for history in ("", " -D l"):
+        if history:
+            for pair in _FITTING_PAIRS:
+                yield _case(f"OrderedAccess_{next(numbers)}", *_access("ordered", *pair, history=history))
+        publisher, by_instance = _access("ordered", "t", "i", history=history)
+        _, in_order = _access("ordered", "t", "t", history=history)
+        yield _case(
+            f"OrderedAccess_{next(numbers)}",
+            f"{publisher} -z 0 --num-instances 4 --write-period 100",
+            f"{by_instance} --take-read --read-period 400",
+            f"{in_order} --take-read --read-period 400",
+            expected=BY_INSTANCE_AND_IN_ORDER,
+            check=checks.by_instance_or_in_order,
+        )
+
+
+def _coherent_cases() -> Iterator[SuiteCase]:
+    numbers = count()
+    for pair in _SCOPE_PAIRS:
+        expected = OK if pair in _FITTING_PAIRS else INCOMPATIBLE
+        yield _case(f"CoherentSets_{next(numbers)}", *_access("coherent", *pair), expected=expected)
+    publisher, subscriber = "-P -r -k 0 --access-scope t", _access("coherent", "t", "t")[1]
+    yield _case(f"CoherentSets_{next(numbers)}", publisher, subscriber, expected=INCOMPATIBLE)
+    for history in ("", " -D l"):
+        if history:
+            for pair in _FITTING_PAIRS:
+                yield _case(f"CoherentSets_{next(numbers)}", *_access("coherent", *pair, history=history))
+        for scope in _SCOPES:
+            publisher, subscriber = _access("coherent", scope, scope, history=history)
+            yield _case(
+                f"CoherentSets_{next(numbers)}",
+                f"{publisher} --num-topics 3 --num-instances 4 --coherent-sample-count 3 --write-period 100 -z 0",
+                f"{subscriber} --num-topics 3 --take-read --read-period 100",
+                check=checks.whole_sets,
+            )
 
 
 CASES = (
@@ -196,6 +254,8 @@ CASES = (
             for instances in ("", " --num-instances 4")
         )
     ),
+    *_ordered_cases(),
+    *_coherent_cases(),
 )
 
 

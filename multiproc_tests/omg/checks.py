@@ -6,16 +6,19 @@ for 500.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 from .codes import Code
-from .output import Output, Sample
+from .output import SAMPLE, Output, Sample
 
 __all__ = [
     "Check",
     "any_sample",
     "by_colors",
+    "by_instance_or_in_order",
     "by_sizes",
     "deadline_missed",
     "disposed",
@@ -28,6 +31,7 @@ __all__ = [
     "sizes_up_to_20",
     "unregistered",
     "whole_history",
+    "whole_sets",
 ]
 
 Check = Callable[[Output, int], Awaitable[Code]]
@@ -208,3 +212,84 @@ async def groups_of_two_or_three(output: Output, count: int) -> Code:
         if received > count // _THINNED:
             return Code.OK if has_expired else Code.DATA_NOT_CORRECT
     return Code.DATA_NOT_RECEIVED
+
+
+_ORDERED_READ = "Reading with ordered access"
+_COHERENT_READ = "Reading coherent sets"
+_FEWEST_TO_JUDGE = 6  # of four instances; fewer may be of one instance by chance
+_EXCEPTIONS = 0.01  # of the reads: one may come in the middle of a burst
+
+
+async def by_instance_or_in_order(output: Output, count: int) -> Code:
+    """Does each read hand out instance after instance, or all as they were written?
+
+    A read that holds more neighbours of one instance than of two is one by instance.  The suite lets a hundredth of its
+    number of samples be exceptions.
+    """
+    found: Code | None = None
+    exceptions = received = reads = 0
+    colors: list[str] = []
+    first_color = ""
+    while received < count:
+        sample = Sample.from_line(output.line)
+        if sample is not None:
+            first_color = first_color or sample.color
+            received += sample.color == first_color
+            colors.append(sample.color)
+        else:
+            reads += 1
+            judged = _judge_read(colors)
+            colors = []
+            if judged is not None and found is None:
+                found = judged
+            elif judged is not None and judged is not found:
+                exceptions += 1
+            if exceptions > max(1, _EXCEPTIONS * count):
+                return Code.DATA_NOT_CORRECT
+        if reads > count or await output.find(SAMPLE, _ORDERED_READ) is None:
+            return Code.DATA_NOT_RECEIVED
+    return found or Code.DATA_NOT_RECEIVED
+
+
+def _judge_read(colors: list[str]) -> Code | None:
+    """None where it holds too little to tell."""
+    if len(colors) <= _FEWEST_TO_JUDGE:
+        return None
+    same = sum(one == other for one, other in pairwise(colors))
+    different = len(colors) - 1 - same
+    if same == different:
+        return None
+    return Code.ORDERED_ACCESS_INSTANCE if same > different else Code.ORDERED_ACCESS_TOPIC
+
+
+_SET_SIZE, _SET_TOPICS, _SET_INSTANCES = 3, 3, 4  # as the publisher of these cases is told
+_FEWEST_SETS, _SETS_PER_SAMPLE = 5, 20  # 500 samples: 25 sets
+
+
+async def whole_sets(output: Output, count: int) -> Code:
+    """Of every instance of every topic, each read returns whole sets: three samples, or three for each of several.
+
+    The sizes of an instance ascend.  The first and the last read of an instance may be cut short.
+    """
+    wanted = max(_FEWEST_SETS, count // _SETS_PER_SAMPLE)
+    samples: dict[tuple[str, str], list[tuple[int, int]]] = {}
+    read = 0
+    while True:
+        sample = Sample.from_line(output.line)
+        if sample is not None:
+            seen = samples.setdefault((sample.topic, sample.color), [])
+            if seen and sample.size <= seen[-1][1]:
+                return Code.DATA_NOT_CORRECT
+            seen.append((read, sample.size))
+        elif _COHERENT_READ in output.line:
+            read += 1
+        is_all = len(samples) == _SET_TOPICS * _SET_INSTANCES
+        if is_all and all(len(seen) >= wanted * _SET_SIZE for seen in samples.values()):
+            break
+        if await output.find(SAMPLE, _COHERENT_READ) is None or read > 4 * wanted + 50:
+            return Code.DATA_NOT_RECEIVED
+    for seen in samples.values():
+        in_read = Counter(number for number, _ in seen)
+        if any(size % _SET_SIZE for size in list(in_read.values())[1:-1]):
+            return Code.DATA_NOT_CORRECT
+    return Code.OK

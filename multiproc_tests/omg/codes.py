@@ -23,5 +23,7 @@ class Code(Enum):
     RECEIVING_FROM_ONE = auto()
     RECEIVING_FROM_BOTH = auto()
     DEADLINE_MISSED = auto()
+    ORDERED_ACCESS_INSTANCE = auto()
+    ORDERED_ACCESS_TOPIC = auto()
     PUB_UNSUPPORTED_FEATURE = auto()
     SUB_UNSUPPORTED_FEATURE = auto()

@@ -28,8 +28,7 @@ Written by `python -m multiproc_tests.omg` (`make interop`), which plays the cas
 [suite](https://github.com/omg-dds/dds-rtps) with its numbers of samples and its patience, each on a loopback of its
 own (and once more, by itself, if it failed among others); [shape_main](../shape_main.md) has the options. Columns are
 *publishers to subscribers*. `-`: one of the programs says that it does not support what the case is about. **no** is a
-failure; a plain no is a limit of the other implementation, and is explained below. The cases on ordered access and
-coherent sets are not played yet.
+failure; a plain no is a limit of the other implementation, and is explained below.
 """
 
 

@@ -12,7 +12,7 @@ import pytest
 from ddsi.cli.shape_main import main
 from ddsi.cli.shape_main_lines import sample_line, state_line, status_line
 from ddsi.cli.shape_main_options import OptionError, ShapeMainOptions, option_parser, parse_options, warnings
-from ddsi.cli.shape_main_qos import content_filter, endpoint_qos, group_qos, participant_config, unsupported
+from ddsi.cli.shape_main_qos import content_filter, endpoint_qos, group_qos, participant_config
 from ddsi.cli.shape_types import shape_form
 from ddsi.config import Config
 from ddsi.structure import qos_policies as p
@@ -132,23 +132,19 @@ def test_announcements_and_fragments_are_configuration() -> None:
     assert participant_config(_options("-P"), Config(fragment_size=1000)) == Config(fragment_size=1000)
 
 
-@pytest.mark.parametrize("words", ["-P --coherent", "-S --ordered", "-P --access-scope g"])
-def test_what_cannot_be_done_ends_with_the_words_that_the_suite_looks_for(
-    words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["-t", "Square", "-d", "231", *words.split()]) == 2
-    lines = capsys.readouterr().out.splitlines()
-    assert "Create topic: Square" in lines
-    assert lines[-1].endswith("= not supported")
-    assert not any("Create reader" in line or "Create writer" in line for line in lines)
-
-
 @pytest.mark.parametrize(
-    "words",
-    ["-P -c RED -f 1 -s 1 --lifespan 1", "-S -c RED", "-S --access-scope i --time-filter 9", "-P -p x -D t -k 0"],
+    ("words", "expected"),
+    [
+        ("-P", None),
+        ("-P --access-scope t", p.Presentation(p.AccessScope.TOPIC)),
+        ("-S --coherent", p.Presentation(coherent_access=True)),
+        ("-S --ordered --access-scope g", p.Presentation(p.AccessScope.GROUP, ordered_access=True)),
+        ("-P --coherent --ordered --access-scope i", p.Presentation(p.AccessScope.INSTANCE, True, True)),
+    ],
 )
-def test_what_can_be_done_is_done(words: str) -> None:
-    assert unsupported(_options(words)) is None
+def test_presentation_is_of_the_group(words: str, expected: p.Presentation | None) -> None:
+    assert group_qos(_options(words)).presentation == expected
+    assert endpoint_qos(_options(words)).presentation is None
 
 
 @pytest.mark.parametrize(
