@@ -464,9 +464,8 @@ class Inbound:
         reason = DropReason.UNMATCHED
         if incoming.participant is None:
             reason = DropReason.UNKNOWN_PARTICIPANT
-        elif not EntityId(writer_id).is_builtin:
-            if self._engine.known_writers.get(Guid(incoming.prefix + writer_id)) is None:
-                reason = DropReason.UNKNOWN_WRITER
+        elif not (EntityId(writer_id).is_builtin or self._engine.known_writers.get(Guid(incoming.prefix + writer_id))):
+            reason = DropReason.UNKNOWN_WRITER
         self._engine.dropped(reason, incoming.source)
 
     def _data_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
