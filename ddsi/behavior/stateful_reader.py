@@ -15,10 +15,12 @@ from ..structure.discovered import DiscoveredWriterData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
+from ..structure.qos_policies import Transient
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason
 from .defrag import FRAGMENT_SILENCE, Defragmenter, Keep, PartialSample
 from .dropping import WhenDropped, drop_silently
+from .originals import Originals
 from .repeats import Position, RepeatFilter
 from .transmissions import SendAckNack, SendNackFrag
 from .writer_proxy import WriterProxy
@@ -92,6 +94,7 @@ class StatefulReader:
         # What to do with what a writer that was lost repeats.  None: to begin anew is right, as builtin topics do.
         self.on_repeat: Callable[[CacheChange], None] | None = None
         self._repeats: RepeatFilter | None = None
+        self._originals = Originals() if qos.durability.KIND >= Transient.KIND else None
         self._reorder_max_samples = reorder_max_samples
         self._reorder_max_octets = reorder_max_octets
         self._on_dropped = on_dropped
@@ -143,7 +146,13 @@ class StatefulReader:
             self._deliver(proxy, now)
         if may_return and proxy.latest_timestamp >= 0:
             self._remember(proxy)
+        if self._originals is not None:
+            self._originals.writer_ended(guid, proxy.next_sn - 1)
         return proxy
+
+    def is_repeated(self, change: CacheChange) -> bool:
+        """Is it handed on by a service, and known from its own writer or from another service?"""
+        return self._originals is not None and self._originals.is_repeated(change, self.writers)
 
     def _remember(self, proxy: WriterProxy) -> None:
         """From now on, what comes passes the filter first: a reader that loses nobody is spared that."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..behavior.defrag import PartialSample
@@ -17,7 +16,6 @@ from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.writer_proxy import WriterProxy
 from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.acknack import AckNack, NackFrag
-from ..messages.content_filter_info import decode_content_filter_info
 from ..messages.data import Data
 from ..messages.data_frag import DataFrag
 from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD, envelope_end, key_hash_alone
@@ -25,17 +23,16 @@ from ..messages.gap import Gap
 from ..messages.heartbeat import Heartbeat, HeartbeatFrag
 from ..messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
 from ..messages.raw_submessage import RawSubmessage, SubmessageKind, iterate_submessages, submessage_name
-from ..serialization.parameter_id import ParameterId
-from ..serialization.parameter_list import MustUnderstandUnknown, ParameterList
+from ..serialization.parameter_list import MustUnderstandUnknown
 from ..spi import NoKeys, NotForUs, Octets, Outcome, Protection, Rejected
 from ..structure.builtin_entity_ids import SPDP_WRITER
 from ..structure.cache_change import CacheChange, ChangeKind, StatusInfo
-from ..structure.coherence import Coherence
 from ..structure.errors import MalformedMessage, MalformedSample
 from ..structure.guid import EntityId, Guid
 from ..structure.locator import Locator
 from ..structure.sequence_number import NumberSet
 from ..trace.reasons import DropReason, SampleLossReason
+from .inline_qos import NUMBERS_END, InlineQos
 from .local_endpoints import LocalReader
 
 if TYPE_CHECKING:
@@ -46,15 +43,10 @@ __all__ = ["Inbound", "Incoming"]
 _DATA = int(SubmessageKind.DATA)
 _INFO_TS = int(SubmessageKind.INFO_TS)
 _TIMESTAMP = struct.Struct("<II")
-_NUMBER = {True: struct.Struct("<iI"), False: struct.Struct(">iI")}
-_COHERENCE = (ParameterId.COHERENT_SET, ParameterId.GROUP_SEQ_NUM, ParameterId.GROUP_COHERENT_SET)
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
 _LE_DATA_AND_QOS = 0x07
 _SEC_PREFIX = int(SubmessageKind.SEC_PREFIX)
 _UNKNOWN_ID = bytes(4)
-# No writer gets that far in 100,000 years at a million samples a second.  Beyond it, what we add to a peer's numbers
-# might no longer fit the wire.
-_NUMBERS_END = 1 << 62
 _CONTRADICTIONS_OF_A_RESTART = 3  # one or two may be HEARTBEATs that were long under way
 # What one message may ask for beyond its parsing, counted as if each were so many members of a number set.  Honest ones
 # hold an announcement of a participant, some sets, and the end of one large sample with the beginning of another.
@@ -294,11 +286,11 @@ class Inbound:
         _, to_inline_qos, reader_id, writer_id, high, low = DATA_BODY.unpack_from(view, start)
         number = high << 32 | low
         payload_start = start + 4 + to_inline_qos + (_KEY_HASH_QOS if key_hash else 0)
-        if not 0 < number < _NUMBERS_END or to_inline_qos < 16 or to_inline_qos & 3 or end - payload_start < 4:
+        if not 0 < number < NUMBERS_END or to_inline_qos < 16 or to_inline_qos & 3 or end - payload_start < 4:
             raise MalformedMessage(f"number {number}, octetsToInlineQos {to_inline_qos}", element="DATA", offset=start)
         remote = self._engine.remote_writers.get(incoming.prefix + writer_id)
         if remote is None:
-            inline = _InlineQos(key_hash=key_hash) if key_hash else None
+            inline = InlineQos(key_hash=key_hash) if key_hash else None
             self._from_unmatched(incoming, writer_id, reader_id, number, view[payload_start:end], inline)
             return
         if not self._hooks.admits(remote.guid, incoming.protection):
@@ -325,7 +317,7 @@ class Inbound:
             return
         data = Data.decode(raw.flags, raw.body)
         _check_number(data.writer_sn, raw)
-        inline = _InlineQos.read(data.inline_qos)
+        inline = InlineQos.read(data.inline_qos)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
             self._from_unmatched(
@@ -356,7 +348,7 @@ class Inbound:
         reader_id: bytes,
         number: int,
         payload: bytes | bytearray,
-        inline: _InlineQos,
+        inline: InlineQos,
         *,
         is_key: bool,
     ) -> None:
@@ -379,6 +371,7 @@ class Inbound:
             coherence=coherence,
         )
         change.verdicts = inline.verdicts
+        change.original = inline.original
         self._change(incoming, remote, reader_id, change)
 
     def _nothing(
@@ -403,6 +396,9 @@ class Inbound:
             if reader_id != _UNKNOWN_ID and reader_id != reader.guid[12:]:
                 continue
             local = self._engine.local_readers[reader.guid]
+            if change.original is not None and reader.is_repeated(change):
+                self._nothing(incoming, remote, reader.guid[12:], change.sequence_number)
+                continue
             if change.is_end_of_set:
                 if local.sets is None:
                     self._nothing(incoming, remote, reader.guid[12:], change.sequence_number)
@@ -437,7 +433,7 @@ class Inbound:
         reader_id: bytes,
         number: int,
         payload: Octets,
-        inline: _InlineQos | None = None,
+        inline: InlineQos | None = None,
     ) -> None:
         """DATA of a writer that no reader here is matched with.  SPDP is the one that is expected."""
         if writer_id == SPDP_WRITER:
@@ -555,7 +551,7 @@ class Inbound:
                 return
             octets = bytes(payload)
         timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp
-        inline = _InlineQos.read(sample.inline_qos)
+        inline = InlineQos.read(sample.inline_qos)
         self._joined(incoming, remote, sample.reader_id, data.writer_sn, octets, inline, is_key=data.is_key)
         incoming.timestamp = timestamp
 
@@ -687,64 +683,5 @@ class Inbound:
 
 
 def _check_number(number: int, raw: RawSubmessage) -> None:
-    if number >= _NUMBERS_END:
+    if number >= NUMBERS_END:
         raise MalformedMessage(f"no writer reaches {number}", element=submessage_name(raw.kind), offset=raw.offset)
-
-
-class _InlineQos:
-    """What a DATA's inline QoS says that concerns receiving it.  RTPS 2.5 §8.7, §9.6.4."""
-
-    __slots__ = ("coherence", "key_hash", "related", "status", "verdicts")
-
-    def __init__(self, status: int = 0, key_hash: bytes = b"", related: tuple[Guid, int] | None = None) -> None:
-        self.status = status
-        self.coherence: Coherence | None = None
-        self.key_hash = key_hash
-        self.related = related
-        self.verdicts: dict[bytes, bool] | None = None  # what content filters say, by their signatures
-
-    @classmethod
-    def read(cls, parameters: object) -> _InlineQos:
-        """Unknown parameters are skipped, but one that must be understood makes the sample void (RTPS 2.5 §9.6.3)."""
-        if not isinstance(parameters, ParameterList):
-            return _NO_INLINE_QOS
-        parameters.require_understood()
-        status = parameters.get(ParameterId.STATUS_INFO)
-        key_hash = parameters.get(ParameterId.KEY_HASH)
-        inline = cls(
-            status[3] if status is not None and len(status) >= 4 else 0,
-            bytes(key_hash[:16]) if key_hash is not None and len(key_hash) >= 16 else b"",
-        )
-        filter_info = parameters.get(ParameterId.CONTENT_FILTER_INFO)
-        if filter_info is not None:
-            inline.verdicts = decode_content_filter_info(filter_info, little_endian=parameters.little_endian)
-        inline.coherence = _coherence(parameters)
-        return inline
-
-    def coherence_of(self, *, has_sample: bool) -> Coherence | None:
-        """What speaks of a coherent set, and stands with no sample, is the end of one; whatever number it bears."""
-        coherence = self.coherence
-        if coherence is None or has_sample or self.status & StatusInfo.FILTERED:
-            return coherence
-        return replace(coherence, is_end=True)
-
-
-def _coherence(parameters: ParameterList) -> Coherence | None:
-    """Its place in a set and in its publisher, if it says so.  RTPS 2.5 §8.7.5, §8.7.6, §9.6.4."""
-    if not any(parameters.get(parameter) is not None for parameter in _COHERENCE):
-        return None
-    set_sn, group_sn, group_set_sn = (_sequence_number(parameters, parameter) for parameter in _COHERENCE)
-    return Coherence(set_sn, group_sn, group_set_sn)
-
-
-def _sequence_number(parameters: ParameterList, parameter: ParameterId) -> int:
-    """0 where it is not there, or cannot be."""
-    value = parameters.get(parameter)
-    if value is None or len(value) < 8:
-        return 0
-    high, low = _NUMBER[parameters.little_endian].unpack_from(value)
-    number: int = high << 32 | low
-    return number if 0 < number < _NUMBERS_END else 0
-
-
-_NO_INLINE_QOS = _InlineQos()

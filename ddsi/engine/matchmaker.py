@@ -270,7 +270,8 @@ class Matchmaker:
                 keep=Keep.NEWEST if is_stateless else Keep.LOWEST,
             )
             remote = engine.remote_writers[data.guid] = RemoteWriter(data, defragmenter, participant)
-        proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=reader.uses_filter)
+        uses_filter = reader.uses_filter or data.is_replay
+        proxy = reader.behavior.matched_writer_add(data, locators, now, uses_filter=uses_filter)
         remote.readers.append((reader.behavior, proxy))
         remote.readers_changed()
         engine.proxy_touched(reader.behavior, proxy)

@@ -336,7 +336,8 @@ def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterLis
     """
     content_filter = reader.content_filter if reader is not None and change.kind is ChangeKind.ALIVE else None
     coherence = change.coherence
-    is_plain = change.related is None and not change.key_hash and content_filter is None and coherence is None
+    identities = change.related is not None or change.original is not None
+    is_plain = not (identities or change.key_hash) and content_filter is None and coherence is None
     if change.kind is ChangeKind.ALIVE and is_plain:
         return None
     parameters = ParameterList(little_endian=True)
@@ -350,6 +351,9 @@ def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterLis
     if change.related is not None:
         guid, number = change.related
         parameters.add(ParameterId.RELATED_SAMPLE_IDENTITY, guid + _number(number))
+    if change.original is not None:
+        guid, number = change.original
+        parameters.add(ParameterId.ORIGINAL_WRITER_INFO, guid + _number(number))
     if coherence is not None:
         _add_coherence(parameters, coherence)
     return parameters

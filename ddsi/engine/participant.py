@@ -60,7 +60,7 @@ from ..structure.errors import NotAllowedBySecurity
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
-from ..structure.qos_policies import BinaryProperty, Properties, Property
+from ..structure.qos_policies import BinaryProperty, KeepAll, Properties, Property, Volatile
 from ..structure.status import SecurityRevoked, Status
 from ..structure.time import ticks_from_nanoseconds
 from ..structure.vendor import PROTOCOL_VERSION
@@ -729,9 +729,11 @@ class Participant:
         """A writer in our tables, announced by nobody and matched with nobody."""
         is_builtin = data.guid.entity_id.is_builtin
         behavior_class = FilteringWriter if filters else StatefulWriter if is_builtin else ContentFilteringWriter
+        # What it keeps for whom is its user's affair; a change goes when those that it is for have it.
+        qos = replace(data.qos, durability=Volatile(), history=KeepAll()) if data.is_replay else data.qos
         behavior = behavior_class(
             data.guid,
-            data.qos,
+            qos,
             fragment_octets=fragment_octets_for(
                 self._max_message_octets, self.config.fragment_size, self.hooks.overhead(data.guid, ())
             ),

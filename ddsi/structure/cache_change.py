@@ -50,6 +50,7 @@ class CacheChange:
         "key",
         "key_hash",
         "kind",
+        "original",
         "payload",
         "related",
         "sealed",
@@ -83,6 +84,8 @@ class CacheChange:
         self.key_hash = key_hash
         self.destination = destination
         self.related = related
+        # Of a change that a persistence service hands on: whose it was, and its number there.
+        self.original: tuple[Guid, int] | None = None
         self.expiry = expiry
         self.coherence = coherence
         self.fragment_octets = 0

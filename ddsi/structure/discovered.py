@@ -15,12 +15,16 @@ from .qos_policies import BinaryProperty, Property
 from .vendor import OUR_VENDOR_ID, PROTOCOL_VERSION, VendorId
 
 __all__ = [
+    "REPLAY_USER_DATA",
     "ContentFilterProperty",
     "DiscoveredEndpointData",
     "DiscoveredParticipantData",
     "DiscoveredReaderData",
     "DiscoveredWriterData",
 ]
+
+REPLAY_USER_DATA = b"ddsi.persistence-service"
+"""User data of the writers by which a persistence service hands on what others wrote."""
 
 Parameter = tuple[int, bytes]
 """A parameter that the core carries but does not read: its id, and its value as little-endian octets."""
@@ -88,6 +92,11 @@ class DiscoveredWriterData(DiscoveredEndpointData):
     """A writer as announced by SEDP.  Other names: publication, proxy writer's data."""
 
     max_serialized_size: int | None = None
+
+    @property
+    def is_replay(self) -> bool:
+        """Does it belong to a persistence service, and send each reader what that one lacks, and no other?"""
+        return self.qos.user_data.value == REPLAY_USER_DATA
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
