@@ -16,10 +16,14 @@ General layout, top to bottom; a room imports only rooms above it, never this pa
     transport      sockets, clock, trio                  simulation   the same engine over a virtual network
     dcps           what applications hold                                               DDS 1.4
     portal         the engine in a thread of its own; blocking, aio: its faces for scripts and for asyncio
+    rpc            request and reply                                                    DDS-RPC 1.0
     cli            the ``ddsi`` command
 
-The names below are the public face; everything else may change.
+The names below are the public face, and so are ``ddsi.blocking``, ``ddsi.aio`` and ``ddsi.rpc``, imported when they
+are first used; everything else may change.
 """
+
+from typing import TYPE_CHECKING
 
 from .config import Config
 from .config.qos_profiles import QosProvider
@@ -127,6 +131,21 @@ from .structure.status import (
 )
 from .structure.time import Time
 from .xtypes import deserialize, dynamic_type, idl, key_hash, serialize, type_information, type_objects
+
+if TYPE_CHECKING:
+    from . import aio as aio
+    from . import blocking as blocking
+    from . import rpc as rpc
+else:
+
+    def __getattr__(name: str) -> object:
+        """``ddsi.rpc`` after ``import ddsi`` alone: few programs need these rooms, so they are not imported before."""
+        if name in ("aio", "blocking", "rpc"):
+            from importlib import import_module
+
+            return import_module(f".{name}", __name__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 XCDR1 = DataRepresentationId.XCDR1
 XCDR2 = DataRepresentationId.XCDR2

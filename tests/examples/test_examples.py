@@ -237,3 +237,10 @@ def test_who_is_there_in_another_process() -> None:
 
 def test_without_trio() -> None:
     assert output_of(EXAMPLES / "08_without_trio.py") == ["2 + 2 = 4", "3 + 3 = 6", "5 + 5 = 10"]
+
+
+def test_request_and_reply() -> None:
+    assert sorted(output_of(EXAMPLES / "09_request_reply.py")) == [
+        "alice: heartbeat: says which samples there are",
+        "bob:   nothing, REMOTE_EX_INVALID_ARGUMENT",
+    ]

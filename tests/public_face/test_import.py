@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+import ddsi
+
 
 @pytest.fixture(scope="module")
 def imported() -> set[str]:
@@ -24,7 +26,8 @@ def imported() -> set[str]:
         *("argparse", "email.message", "importlib.metadata", "sqlite3", "tomllib", "xml.parsers.expat", "zipfile"),
         *("cryptography", "lxml", "numpy"),
         *("ddsi.cli", "ddsi.rpc", "ddsi.simulation", "ddsi.storage", "ddsi.trace.events", "ddsi_security"),
-        *("ddsi.config.uri", "ddsi.xtypes.idl_compiler.parser"),
+        *("ddsi.config.uri", "ddsi.config.qos_profile_reader", "ddsi.xtypes.idl_compiler.parser"),
+        *("asyncio", "ddsi.aio", "ddsi.blocking", "ddsi.portal"),
     ],
 )
 def test_what_few_programs_need_is_left_for_later(imported: set[str], module: str) -> None:
@@ -33,3 +36,11 @@ def test_what_few_programs_need_is_left_for_later(imported: set[str], module: st
 
 def test_what_a_publisher_needs_is_there(imported: set[str]) -> None:
     assert {"ddsi.dcps.data_writer", "ddsi.engine.participant", "ddsi.transport.pump", "ddsi.xtypes.idl"} <= imported
+
+
+@pytest.mark.parametrize("room", ["aio", "blocking", "rpc"])
+def test_rooms_that_few_programs_need_are_there_when_they_are_named(room: str) -> None:
+    program = f"import ddsi; assert ddsi.{room} is __import__('importlib').import_module('ddsi.{room}')"
+    subprocess.run([sys.executable, "-c", program], check=True)
+    with pytest.raises(AttributeError, match="has no attribute 'bloking'"):
+        _ = ddsi.bloking  # type: ignore[attr-defined]

@@ -1,0 +1,3 @@
+"""Every test of this room gets its ``domain`` from here."""
+
+from tests.dcps.running import domain as domain
