@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import cast
 
+from ..behavior.content_filter import CompileFilter, Evaluate
 from ..config import Config
 from ..engine import (
     Compute,
@@ -23,6 +24,7 @@ from ..engine import (
     WriterProgress,
 )
 from ..spi import SecurityHooks, load_hooks
+from ..structure.discovered import ContentFilterProperty
 from ..structure.guid import Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import Qos, reader_qos, writer_qos
@@ -190,8 +192,12 @@ class Node:
         keyed: bool = False,
         filters: bool = False,
         type_name: str = "T",
+        compile_filter: CompileFilter | None = None,
     ) -> NodeWriter:
-        local = self.engine.create_writer(topic, type_name, writer_qos(qos), self.now, is_keyed=keyed, filters=filters)
+        """``filters``: each change has a destination.  ``compile_filter``: it evaluates readers' content filters."""
+        local = self.engine.create_writer(
+            topic, type_name, writer_qos(qos), self.now, is_keyed=keyed, filters=filters, compile_filter=compile_filter
+        )
         writer = NodeWriter(self, local)
         self.writers.append(writer)
         self.pump()
@@ -206,11 +212,13 @@ class Node:
         takes: bool = True,
         uses_filter: bool = False,
         type_name: str = "T",
+        content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
     ) -> NodeReader:
         keys = SIMULATED_KEYS if keyed else None
         local = self.engine.create_reader(
-            topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys, uses_filter=uses_filter
-        )
+            topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys, uses_filter=uses_filter,
+            content_filter=content_filter,
+        )  # fmt: skip
         reader = NodeReader(self, local, self._books.books[local.guid], takes=takes)
         self.readers.append(reader)
         self.pump()
