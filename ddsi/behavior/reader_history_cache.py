@@ -284,7 +284,7 @@ class ReaderHistoryCache:
         place = len(samples)
         for index in range(len(samples) - 1, -1, -1):
             known = samples[index]
-            if not known.valid_data or _stamp(known._change) < stamp:
+            if not known.valid_data or _stamp(known._change) <= stamp:
                 break
             later, place = known, index
         samples.insert(place, info)

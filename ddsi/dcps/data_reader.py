@@ -9,7 +9,7 @@ import trio
 
 from ..behavior.content_filter import Evaluate
 from ..behavior.reader_history_cache import ReaderHistoryCache
-from ..engine import KeyCodec, LocalReader, publication_data
+from ..engine import KeyCodec, LocalReader, LocalWriter, publication_data
 from ..structure.builtin_topic_data import PublicationBuiltinTopicData
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import ContentFilterProperty
@@ -82,17 +82,28 @@ class DataReader(SampleReader[T], Endpoint):
         super().__init__(participant, qos)
         self._parent = parent
         self._topic: Topic[T] = topic
-        plan = self._plan()
-        self._qos, self._endpoint_qos = plan.merged, plan.resolved
+        self._filtered = filtered
+        self._is_enabled = parent._enables_members
         support = topic.type_support
         self._deserialize = support.deserialize
         self._deserialize_key = support.deserialize_key
         self._undecodable: list[CacheChange] = []
+        plan = self._plan()
+        self._qos, self._endpoint_qos = plan.merged, plan.resolved
+        self._create(plan)
+        if filtered is not None:
+            filtered._readers.add(self)
+        parent._adopt(self)
+        self._pump.settle()
+
+    def _create(self, plan: QosPlan) -> None:
+        parent, topic, support, filtered = self._parent, self._topic, self._topic.type_support, self._filtered
         self._reader: LocalReader = self._pump.engine.create_reader(
             topic.name,
             support.type_name,
-            self._endpoint_qos,
+            plan.resolved,
             self._pump.now(),
+            is_enabled=self._is_enabled,
             is_keyed=support.is_keyed,
             keys=_key_codec(topic) if support.is_keyed else None,
             content_filter=(filtered._announced, filtered._evaluate) if filtered is not None else None,
@@ -102,11 +113,15 @@ class DataReader(SampleReader[T], Endpoint):
         history = self._reader.history
         assert history is not None
         self._history: ReaderHistoryCache = history
-        self._filtered = filtered
-        if filtered is not None:
-            filtered._readers.add(self)
-        parent._adopt(self)
-        participant._register(self._reader.guid, self)
+        self._participant._register(self._reader.guid, self)
+
+    def _delete(self, local: LocalWriter | LocalReader) -> None:
+        assert isinstance(local, LocalReader)
+        self._participant._deregister(local.guid)
+        self._participant._when_running(lambda pump: pump.engine.delete_reader(local, pump.now()))
+
+    def _on_enable(self) -> None:
+        self._pump.engine.user_endpoints.enable_reader(self._reader, self._pump.now())
         self._pump.settle()
 
     def __repr__(self) -> str:
@@ -129,6 +144,15 @@ class DataReader(SampleReader[T], Endpoint):
         """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
         key = self._topic.type_support.key(sample)
         return key if key in self._history.instances else None
+
+    def get_key_value(self, handle: bytes) -> T:
+        """A sample with the key of a known instance, the type's defaults elsewhere.  Raises BadParameter.
+
+        DDS 1.4 §2.2.2.5.3.28.
+        """
+        if handle not in self._history.instances:
+            raise BadParameter(f"{self!r} knows no instance {handle!r}, or no longer")
+        return self._topic.type_support.sample_from_key(handle)
 
     # --- waiting -----------------------------------------------------------------------------------------
 
@@ -247,8 +271,7 @@ class DataReader(SampleReader[T], Endpoint):
     def _on_close(self) -> None:
         self._parent._disown(self)
         super()._on_close()
-        self._participant._deregister(self._reader.guid)
-        self._participant._when_running(lambda pump: pump.engine.delete_reader(self._reader, pump.now()))
+        self._delete(self._reader)
 
 
 def _with_representations(qos: EndpointQos) -> EndpointQos:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 import trio
 
-from ..engine import LocalWriter, subscription_data
+from ..engine import LocalReader, LocalWriter, subscription_data
 from ..structure.builtin_topic_data import SubscriptionBuiltinTopicData
-from ..structure.cache_change import ChangeKind
+from ..structure.cache_change import ChangeKind, StatusInfo
 from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, writer_qos
-from ..structure.qos_policies import DataRepresentation, DataRepresentationId
+from ..structure.qos_policies import BySourceTimestamp, DataRepresentation, DataRepresentationId
 from ..structure.status import (
     InconsistentTopic,
     LivelinessLost,
@@ -67,31 +67,48 @@ class DataWriter(Endpoint, Generic[T]):
         self._topic: Topic[T] = topic
         support = topic.type_support
         self._support = support
-        plan = self._plan()
-        self._qos, resolved = plan.merged, plan.resolved
-        self._endpoint_qos = resolved
-        self._representation = resolved.data_representation.ids[0]
-        self._serialize = support.serializer(self._representation)
+        self._is_enabled = parent._enables_members
         self._key = support.key
-        self._serialize_key = support.key_serializer(self._representation)
         self._is_keyed = support.is_keyed
-        self._room = trio.lowlevel.ParkingLot()
+        self._instances: dict[bytes, None] = {}  # that it has registered, by writing or in so many words
+        self._latest_ticks = 0
         self._progress = trio.lowlevel.ParkingLot()
         self._pump = participant._running_pump()
+        plan = self._plan()
+        self._qos, self._endpoint_qos = plan.merged, plan.resolved
+        self._create(plan)
+        parent._adopt(self)
+        self._pump.settle()
+
+    def _create(self, plan: QosPlan) -> None:
+        parent, topic, support, resolved = self._parent, self._topic, self._support, plan.resolved
+        representation = resolved.data_representation.ids[0]
         self._writer: LocalWriter = self._pump.engine.create_writer(
             topic.name,
             support.type_name,
             resolved,
             self._pump.now(),
+            is_enabled=self._is_enabled,
             is_keyed=support.is_keyed,
             compile_filter=filter_compiler(support),
             types=support.type_description if self._pump.engine.config.announce_types else None,
             group=parent._group if isinstance(parent, Publisher) else None,
         )
+        self._representation = representation
+        self._serialize = support.serializer(representation)
+        self._serialize_key = support.key_serializer(representation)
         self._hides_keys = support.is_keyed and self._writer.protection.key_protected
         self._key_hashes: dict[bytes, bytes] = {}
-        parent._adopt(self)
-        participant._register(self._writer.guid, self)
+        self._is_by_source = isinstance(resolved.destination_order, BySourceTimestamp)
+        self._participant._register(self._writer.guid, self)
+
+    def _delete(self, local: LocalWriter | LocalReader) -> None:
+        assert isinstance(local, LocalWriter)
+        self._participant._deregister(local.guid)
+        self._participant._when_running(lambda pump: pump.engine.delete_writer(local, pump.now()))
+
+    def _on_enable(self) -> None:
+        self._pump.engine.user_endpoints.enable_writer(self._writer, self._pump.now())
         self._pump.settle()
 
     def __repr__(self) -> str:
@@ -117,18 +134,20 @@ class DataWriter(Endpoint, Generic[T]):
         pump = self._pump
         now = pump.now()
         await pump.checkpoint(now)
-        if self._is_closed:
-            self._check_open()
+        if self._is_closed or not self._is_enabled:
+            self._check_enabled()
         writer = self._writer
         payload = self._serialize(sample)
-        key = self._key(sample) if self._is_keyed and (self._hides_keys or writer.behavior.needs_key) else b""
+        key = self._key(sample) if self._is_keyed else b""
         if writer.behavior.lacks_room(len(payload), key) is not None:
             now = await self._wait_for_room(len(payload), key)
         pump.engine.write(
             writer, ChangeKind.ALIVE, payload, key, now,
-            source_timestamp=None if timestamp is None else _ticks(timestamp),
+            source_timestamp=None if timestamp is None and not self._is_by_source else self._source_ticks(timestamp),
             key_hash=self._key_hash(key) if self._hides_keys else b"",
         )  # fmt: skip
+        if key not in self._instances and self._is_keyed:
+            self._instances[key] = None
         pump.written(now)
 
     async def dispose(self, sample: T, *, timestamp: Timestamp | None = None) -> None:
@@ -142,21 +161,87 @@ class DataWriter(Endpoint, Generic[T]):
         await self._write_end(kind, sample, timestamp)
 
     async def _write_end(self, kind: ChangeKind, sample: T, timestamp: Timestamp | None) -> None:
-        if not self._is_keyed:
-            raise PreconditionNotMet(f"topic {self._topic.name!r} has no key, so it has no instances to end")
+        self._check_has_instances()
         now = self._pump.now()
         await self._pump.checkpoint(now)
-        self._check_open()
+        self._check_enabled()
         payload = self._serialize_key(sample)
         key = self._support.key(sample)
         if self._writer.behavior.lacks_room(len(payload), key) is not None:
             now = await self._wait_for_room(len(payload), key)
         self._pump.engine.write(
             self._writer, kind, payload, key, now,
-            source_timestamp=None if timestamp is None else _ticks(timestamp),
+            source_timestamp=None if timestamp is None and not self._is_by_source else self._source_ticks(timestamp),
             key_hash=self._key_hash(key),
         )  # fmt: skip
+        if kind & StatusInfo.UNREGISTERED:
+            self._instances.pop(key, None)
+        else:
+            self._instances[key] = None
         self._pump.written(now)
+
+    def _source_ticks(self, timestamp: Timestamp | None) -> int:
+        """A source timestamp.  Raises BadParameter where it is older than the one before and readers order by source.
+
+        DDS 1.4 §2.2.2.4.2.6; a clock that was set back, where none is given, gets no sample out of order.
+        """
+        ticks = self._pump.engine.wall_ticks() if timestamp is None else _ticks(timestamp)
+        if self._is_by_source:
+            if ticks < self._latest_ticks:
+                if timestamp is not None:
+                    raise BadParameter(
+                        f"timestamp {timestamp} is older than the one before, {float(Time(self._latest_ticks))}, and "
+                        "readers order by source: write in order, or with ByReceptionTimestamp()"
+                    )
+                ticks = self._latest_ticks
+            self._latest_ticks = ticks
+        return ticks
+
+    # --- instances ---------------------------------------------------------------------------------------
+
+    def register_instance(self, sample: T) -> bytes:
+        """Announce that the instance that ``sample`` belongs to will be written; returns its handle.
+
+        Writing does so too.  Nobody is told: RTPS knows no such message.  DDS 1.4 §2.2.2.4.2.5.
+        """
+        self._check_has_instances()
+        self._check_enabled()
+        key = self._support.key(sample)
+        self._instances[key] = None
+        return key
+
+    def lookup_instance(self, sample: T) -> bytes | None:
+        """The handle of the instance that ``sample`` belongs to; None if it is not registered here."""
+        key = self._support.key(sample)
+        return key if key in self._instances else None
+
+    def get_key_value(self, handle: bytes) -> T:
+        """A sample with the key of a registered instance, the type's defaults elsewhere.  Raises BadParameter.
+
+        DDS 1.4 §2.2.2.4.2.9.
+        """
+        if handle not in self._instances:
+            raise BadParameter(f"{self!r} has registered no instance {handle!r}, or has unregistered it")
+        return self._support.sample_from_key(handle)
+
+    def _check_has_instances(self) -> None:
+        if not self._is_keyed:
+            raise PreconditionNotMet(f"topic {self._topic.name!r} has no key, so it has no instances to end")
+
+    def _say_farewell(self) -> None:
+        """Unregister all instances; WriterDataLifecycle decides that this disposes them.  DDS 1.4 §2.2.3.21.
+
+        Where it does not, the end of the writer, which all readers hear of, says as much.
+        """
+        instances, self._instances = self._instances, {}
+        if not self._endpoint_qos.writer_data_lifecycle.autodispose_unregistered_instances or self._pump.is_closed:
+            return
+        now = self._pump.now()
+        for key in instances:
+            self._pump.engine.write(
+                self._writer, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED,
+                self._serialize_key(self._support.sample_from_key(key)), key, now, key_hash=self._key_hash(key),
+            )  # fmt: skip
 
     def _key_hash(self, key: bytes) -> bytes:
         """Where the key is protected the hash is a digest, and goes with samples too: nobody can compute it before
@@ -280,8 +365,8 @@ class DataWriter(Endpoint, Generic[T]):
     def _on_close(self) -> None:
         self._parent._disown(self)
         self._progress.unpark_all()
-        self._participant._deregister(self._writer.guid)
-        self._participant._when_running(lambda pump: pump.engine.delete_writer(self._writer, pump.now()))
+        self._say_farewell()
+        self._delete(self._writer)
 
 
 def _with_representation(qos: EndpointQos, possible: tuple[DataRepresentationId, ...], topic: Topic[T]) -> EndpointQos:

@@ -70,6 +70,28 @@ class Endpoint(Entity):
         """Do as planned; it was checked."""
         self._own_qos, self._qos, self._endpoint_qos = plan.own, plan.merged, plan.resolved
 
+    def _create(self, plan: QosPlan) -> None:
+        """Make it in the engine, and enable it there if it is enabled.  Raises NotAllowedBySecurity."""
+        raise NotImplementedError
+
+    def _delete(self, local: LocalWriter | LocalReader) -> None:
+        """Undo :meth:`_create`."""
+        raise NotImplementedError
+
+    def _create_anew(self, plan: QosPlan) -> None:
+        """It is not enabled, so whatever it is to become it may; nobody has seen it yet."""
+        before = self._local()
+        self._create(plan)
+        self._delete(before)
+        Endpoint._follow(self, plan)
+
+    def _say_farewell(self) -> None:
+        """It is about to end: a last word, if it has one."""
+
+    @property
+    def _factory(self) -> Parent:
+        return self._parent
+
     def _change_qos(self, after: Qos) -> None:
         follow_all([self._plan(own=after)])
 
@@ -79,6 +101,10 @@ def follow_all(plans: Iterable[QosPlan]) -> None:
     plans = list(plans)
     for plan in plans:
         endpoint = plan.endpoint
-        endpoint._participant._running_pump().engine.qos_changes.check(endpoint._local(), plan.resolved)
+        if endpoint.is_enabled:
+            endpoint._participant._running_pump().engine.qos_changes.check(endpoint._local(), plan.resolved)
     for plan in plans:
-        plan.endpoint._follow(plan)
+        if plan.endpoint.is_enabled:
+            plan.endpoint._follow(plan)
+        else:
+            plan.endpoint._create_anew(plan)

@@ -13,7 +13,14 @@ from weakref import WeakSet
 
 import trio
 
-from ..structure.errors import AlreadyDeleted, BadParameter, ImmutablePolicy, NotAllowedBySecurity
+from ..structure.errors import (
+    AlreadyDeleted,
+    BadParameter,
+    ImmutablePolicy,
+    NotAllowedBySecurity,
+    PreconditionNotMet,
+)
+from ..structure.guid import Guid
 from ..structure.qos import Qos
 from ..structure.status import DataAvailable, DataOnReaders, Status
 
@@ -79,6 +86,7 @@ class Entity:
             raise BadParameter(f"{type(self).__name__}: qos is a ddsi.Qos(...), not {qos!r}")
         self._own_qos = self._qos = qos if qos is not None else Qos()
         self._is_closed = False
+        self._is_enabled = True
         self._revocation: str | None = None  # why security closed it, if it did
         self._changed = trio.lowlevel.ParkingLot()
         self._statuses: dict[type, Status] = {}
@@ -103,6 +111,34 @@ class Entity:
         if not isinstance(qos, Qos):
             raise BadParameter(f"{type(self).__name__}: qos is a ddsi.Qos(...), not {qos!r}")
         self._change_qos(self._own_qos | qos)
+
+    @property
+    def is_enabled(self) -> bool:
+        """Does it take part?  Not where EntityFactory says otherwise, until :meth:`enable`.  DDS 1.4 §2.2.3.20."""
+        return self._is_enabled
+
+    def enable(self) -> None:
+        """Let it take part: it is announced and matched from now on, and some policies are fixed.
+
+        What belongs to it is enabled too, if its EntityFactory policy says so.  Raises PreconditionNotMet when what it
+        belongs to is not enabled yet; AlreadyDeleted.  DDS 1.4 §2.2.2.1.1.7.
+        """
+        self._check_open()
+        if self._is_enabled:
+            return
+        factory = self._factory
+        if factory is not None and not factory.is_enabled:
+            raise PreconditionNotMet(f"{self!r}: enable {factory!r} first, which it belongs to")
+        self._is_enabled = True
+        self._on_enable()
+
+    @property
+    def _factory(self) -> Parent | None:
+        """The entity that it was made with."""
+        return None
+
+    def _on_enable(self) -> None:
+        """What the kind of entity does when it begins to take part."""
 
     def _change_qos(self, after: Qos) -> None:
         """What the kind of entity does to have these policies."""
@@ -192,6 +228,11 @@ class Entity:
             self._check_not_revoked()
             raise AlreadyDeleted(f"{self!r} was closed, by close() or with what it belongs to; make another")
 
+    def _check_enabled(self) -> None:
+        self._check_open()
+        if not self._is_enabled:
+            raise PreconditionNotMet(f"{self!r} is not enabled: call enable() first, or leave EntityFactory alone")
+
 
 class Parent(Entity):
     """An entity that others belong to, and end with: DomainParticipant, Publisher, Subscriber."""
@@ -210,6 +251,33 @@ class Parent(Entity):
         """The policies that its endpoints have wherever they do not set their own."""
         return Qos()
 
+    def contained_entities(self) -> list[Entity]:
+        """What was made with it and lives: of a participant its groups, topics, and endpoints made without a group."""
+        return list(self._members)
+
+    def contains_entity(self, handle: Guid) -> bool:
+        """Is this the Guid of an endpoint that belongs to it, or to a group of it?  DDS 1.4 §2.2.2.2.1.25."""
+        return any(
+            member.contains_entity(handle) if isinstance(member, Parent) else getattr(member, "guid", None) == handle
+            for member in self._members
+        )
+
+    def delete_contained_entities(self) -> None:
+        """Close all of them; itself it stays open.  DDS 1.4 §2.2.2.2.1.18."""
+        for entity in reversed(self.contained_entities()):
+            entity.close()
+
+    @property
+    def _enables_members(self) -> bool:
+        """Does what is made with it take part at once?"""
+        policy = self._own_qos.entity_factory
+        return self._is_enabled and (policy is None or policy.autoenable_created_entities)
+
+    def _on_enable(self) -> None:
+        if self._enables_members:
+            for entity in self.contained_entities():
+                entity.enable()
+
     def _adopt(self, entity: Entity) -> None:
         self._members[entity] = None
 
@@ -222,8 +290,7 @@ class Parent(Entity):
         self._members.pop(entity, None)
 
     def _on_close(self) -> None:
-        for entity in reversed(list(self._members)):
-            entity.close()
+        self.delete_contained_entities()
 
 
 def _changes_of(kind: type) -> tuple[str, ...]:

@@ -42,6 +42,7 @@ class _Group(Parent):
         super().__init__(qos)
         self._pump = participant._running_pump()
         self._participant = participant
+        self._is_enabled = participant._enables_members
         participant._adopt(self)
 
     def __repr__(self) -> str:
@@ -55,10 +56,19 @@ class _Group(Parent):
     def endpoint_defaults(self) -> Qos:
         return self._qos
 
+    @property
+    def _factory(self) -> Parent:
+        return self._participant
+
     def _change_qos(self, after: Qos) -> None:
-        check_changeable(self._qos, after, f"a {type(self).__name__}")
+        if self._is_enabled:
+            check_changeable(self._qos, after, f"a {type(self).__name__}")
         follow_all(member._plan(group=after) for member in self._members if isinstance(member, Endpoint))
         self._own_qos = self._qos = after
+
+    def _lookup(self, topic_name: str) -> Endpoint | None:
+        members = (member for member in self._members if isinstance(member, Endpoint))
+        return next((member for member in members if member.topic.name == topic_name), None)
 
     def _on_close(self) -> None:
         super()._on_close()
@@ -72,6 +82,10 @@ class Publisher(_Group):
         super().__init__(participant, qos)
         self._group = self._pump.engine.presentation.new_publisher()
         self._is_suspended = False
+
+    def lookup_datawriter(self, topic_name: str) -> Endpoint | None:
+        """A writer of that topic that belongs to the publisher; None: there is none.  DDS 1.4 §2.2.2.4.1.6."""
+        return self._lookup(topic_name)
 
     # --- coherent sets -----------------------------------------------------------------------------------
 
@@ -161,6 +175,10 @@ class Subscriber(_Group):
 
     def status_changes(self) -> frozenset[type]:
         return frozenset({DataOnReaders}) if self._readers_with_news() else frozenset()
+
+    def lookup_datareader(self, topic_name: str) -> Endpoint | None:
+        """A reader of that topic that belongs to the subscriber; None: there is none.  DDS 1.4 §2.2.2.5.2.7."""
+        return self._lookup(topic_name)
 
     def _readers_with_news(self) -> list[Entity]:
         return [member for member in self._members if DataAvailable in member.status_changes()]

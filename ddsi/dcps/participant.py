@@ -39,6 +39,7 @@ from ..transport import Pump, PumpOptions
 from .endpoint import Endpoint
 from .entity import Entity, Parent, deadline_scope
 from .lifetime import Lifetime
+from .topic import Topic
 from .type_access import AnnouncedEndpoint, fetch_type_object, fetch_type_objects
 from .type_discovery import endpoint_type, find_type
 
@@ -152,6 +153,9 @@ class DomainParticipant(Parent):
     async def _linger(self) -> None:
         """Reliable samples that are still under way to other participants get a moment to arrive."""
         pump = self._running_pump()
+        for endpoint in self._endpoints():
+            endpoint._say_farewell()
+        pump.settle()
         with trio.move_on_after(_LINGER_S):
             while lagging := [writer for writer in pump.engine.user_writers() if _has_samples_under_way(writer)]:
                 for writer in lagging:
@@ -190,6 +194,10 @@ class DomainParticipant(Parent):
             self._pump.engine.qos_changes.change_user_data(user_data, self._pump.now())
             self._pump.settle()
         self._own_qos = self._qos = after
+
+    def lookup_topicdescription(self, name: str) -> Topic[Any] | None:
+        """A topic of this participant, by its name; None: there is none.  DDS 1.4 §2.2.2.2.1.13."""
+        return next((entity for entity in self._members if isinstance(entity, Topic) and entity.name == name), None)
 
     def _endpoints(self) -> list[Endpoint]:
         """All writers and readers of topics, wherever they belong to."""
@@ -289,6 +297,22 @@ class DomainParticipant(Parent):
         """Act as if that participant were not there, from now on.  DDS 1.4 §2.2.2.2.1.14."""
         pump = self._running_pump()
         pump.engine.discovery.ignore(guid, pump.now())
+        pump.settle()
+
+    def ignore_publication(self, guid: Guid) -> None:
+        """Act as if that remote writer were not there, from now on.  DDS 1.4 §2.2.2.2.1.16."""
+        pump = self._running_pump()
+        pump.engine.discovery.ignore_endpoint(guid, pump.now())
+        pump.settle()
+
+    def ignore_subscription(self, guid: Guid) -> None:
+        """Act as if that remote reader were not there, from now on.  DDS 1.4 §2.2.2.2.1.17."""
+        self.ignore_publication(guid)
+
+    def ignore_topic(self, topic_name: str) -> None:
+        """Act as if no remote participant had writers or readers of that topic, from now on.  DDS 1.4 §2.2.2.2.1.15."""
+        pump = self._running_pump()
+        pump.engine.discovery.ignore_topic(topic_name, pump.now())
         pump.settle()
 
     def assert_liveliness(self) -> None:

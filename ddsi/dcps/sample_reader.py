@@ -180,7 +180,7 @@ class SampleReader(Entity, Generic[T]):
 
         Raises AlreadyDeleted, also when the reader is closed meanwhile.
         """
-        self._check_open()
+        self._check_enabled()
         await self._pump.checkpoint(self._pump.now())
         states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
         while not self._history.matches(selector=selector, **states):
@@ -193,7 +193,7 @@ class SampleReader(Entity, Generic[T]):
 
     def _begin_reading(self, max_samples: int | None) -> int | None:
         """May the application look now, and at how many samples at most?"""
-        self._check_open()
+        self._check_enabled()
         return max_samples
 
     def _has_unread(self) -> bool:
@@ -207,7 +207,7 @@ class SampleReader(Entity, Generic[T]):
     def _next_instance(
         self, previous: bytes | None, condition: ReadCondition | None, samples: int, views: int, instances: int
     ) -> bytes | None:
-        self._check_open()
+        self._check_enabled()
         states, selector = self._selection(condition, samples, views, instances)
         return self._history.next_instance(previous, selector=selector, **states)
 

@@ -41,6 +41,7 @@ class Topic(Entity, Generic[T]):
         self._name = name
         self._type = type_
         self._type_support: TypeSupport[T] = type_support(type_)
+        self._is_enabled = participant._enables_members
         self._inconsistent_count = 0
         participant._adopt(self)
 
@@ -64,8 +65,13 @@ class Topic(Entity, Generic[T]):
     def type_support(self) -> TypeSupport[T]:
         return self._type_support
 
+    @property
+    def _factory(self) -> DomainParticipant:
+        return self._participant
+
     def _change_qos(self, after: Qos) -> None:
-        check_changeable(self._qos, after, f"topic {self._name!r}")
+        if self._is_enabled:
+            check_changeable(self._qos, after, f"topic {self._name!r}")
         endpoints = self._participant._endpoints()
         follow_all(endpoint._plan(topic=after) for endpoint in endpoints if endpoint.topic is self)
         self._own_qos = self._qos = after

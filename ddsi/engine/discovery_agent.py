@@ -67,6 +67,7 @@ class DiscoveryAgent:
         self._announcer = SpdpAnnouncer(announce_to, engine.config.announcement_period, engine.random.random)
         self._eviction = Eviction(engine)
         self._ignored: set[Guid] = set()
+        self._ignored_topics: set[str] = set()
         self._departures = Departures()
         # "Endpoint gone", oldest first: said when, by which builtin writer, under which number.
         self._farewells: deque[tuple[float, EntityId, int]] = deque()
@@ -323,6 +324,20 @@ class DiscoveryAgent:
         self._ignored.add(guid)
         self.participant_lost(guid, LossReason.IGNORED, now)
 
+    def ignore_endpoint(self, guid: Guid, now: float) -> None:
+        """The same of one writer or reader.  DDS 1.4 §2.2.2.2.1.16-17 (ignore_publication, ignore_subscription)."""
+        self._ignored.add(guid)
+        self._writer_lost(guid, LossReason.IGNORED, now)
+        self._reader_lost(guid, LossReason.IGNORED, now)
+
+    def ignore_topic(self, topic_name: str, now: float) -> None:
+        """The same of all endpoints of a topic.  DDS 1.4 §2.2.2.2.1.15 (ignore_topic)."""
+        self._ignored_topics.add(topic_name)
+        for writer_data in self._engine.known_writers.of_topic(topic_name):
+            self._writer_lost(writer_data.guid, LossReason.IGNORED, now)
+        for reader_data in self._engine.known_readers.of_topic(topic_name):
+            self._reader_lost(reader_data.guid, LossReason.IGNORED, now)
+
     def participant_restarted(self, incoming: Incoming) -> None:
         """Its writers have begun anew: another incarnation under the same GUID.  What we knew of the former is void.
 
@@ -402,7 +417,7 @@ class DiscoveryAgent:
             self._engine.dropped_discovery(change, str(error))
             return
         is_known = self._engine.known_writers.get(data.guid) is not None
-        if self._belongs_here(change, data, is_secure=is_secure) and self._may_enter(data.guid, now, is_known=is_known):
+        if self._belongs_here(change, data, is_secure=is_secure) and self._may_enter(data, now, is_known=is_known):
             before = self._engine.known_writers.put(data)
             self._note_endpoint(data, before, now)
             if before is not None and before.topic_name != data.topic_name:
@@ -423,7 +438,7 @@ class DiscoveryAgent:
             self._engine.dropped_discovery(change, str(error))
             return
         is_known = self._engine.known_readers.get(data.guid) is not None
-        if self._belongs_here(change, data, is_secure=is_secure) and self._may_enter(data.guid, now, is_known=is_known):
+        if self._belongs_here(change, data, is_secure=is_secure) and self._may_enter(data, now, is_known=is_known):
             before = self._engine.known_readers.put(data)
             self._note_endpoint(data, before, now)
             if before is not None and before.topic_name != data.topic_name:
@@ -448,10 +463,10 @@ class DiscoveryAgent:
             return False
         return True
 
-    def _may_enter(self, guid: Guid, now: float, *, is_known: bool) -> bool:
+    def _may_enter(self, data: DiscoveredEndpointData, now: float, *, is_known: bool) -> bool:
         """All endpoints together have a bound."""
-        engine = self._engine
-        if guid in self._ignored:
+        engine, guid = self._engine, data.guid
+        if guid in self._ignored or data.topic_name in self._ignored_topics:
             engine.dropped(DropReason.IGNORED, None, str(guid))
             return False
         proxy = engine.participants.get(guid.prefix)

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from functools import partial
 from random import Random
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from ..behavior.content_filter import CompileFilter, ContentFilter, Evaluate
 from ..behavior.content_filtering_writer import ContentFilteringWriter
@@ -83,6 +83,7 @@ from .recorder import Recorder
 from .timeliness import Timeliness
 from .type_lookup import TypeLookup
 from .type_matching import TypeMatching
+from .user_endpoints import UserEndpoints
 
 if TYPE_CHECKING:
     from ..trace.sink import TraceSink
@@ -90,7 +91,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Participant", "ParticipantSetup"]
 
-_Endpoint = TypeVar("_Endpoint")
 _LOSS_TEXT = {
     SampleLossReason.BEST_EFFORT: "skipped by a best-effort stream",
     SampleLossReason.NOT_AVAILABLE: "the writer no longer has it",
@@ -163,8 +163,7 @@ class Participant:
         self.known_readers: EndpointRegistry[DiscoveredReaderData] = EndpointRegistry()
         self.local_writers: dict[bytes, LocalWriter] = {}
         self.local_readers: dict[bytes, LocalReader] = {}
-        self._writers_by_topic: dict[str, dict[Guid, LocalWriter]] = {}
-        self._readers_by_topic: dict[str, dict[Guid, LocalReader]] = {}
+        self.user_endpoints = UserEndpoints(self)
         self.remote_writers: dict[bytes, RemoteWriter] = {}
         self.closing: set[Guid] = set()
         self._hook_writers: dict[str, LocalWriter] = {}
@@ -296,6 +295,7 @@ class Participant:
         is_keyed: bool,
         compile_filter: CompileFilter | None = None,  # evaluates content filters, to spare readers what they would drop
         filters: bool = False,
+        is_enabled: bool = True,
         types: TypeDescription | None = None,
         group: PublisherGroup | None = None,
     ) -> LocalWriter:
@@ -318,11 +318,8 @@ class Participant:
         writer.protection = protection
         if group is not None:
             self.presentation.writer_created(writer, group)
-        self._writers_by_topic.setdefault(topic_name, {})[writer.guid] = writer
-        self.recorder.endpoint_created(data)
-        self.discovery.announce_writer(writer, now)
-        self.liveliness.writer_added(writer, now)
-        self.matchmaker.writer_appeared(writer, now)
+        if is_enabled:
+            self.user_endpoints.enable_writer(writer, now)
         return writer
 
     def create_reader(
@@ -337,6 +334,7 @@ class Participant:
         types: TypeDescription | None = None,
         content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
         uses_filter: bool = False,
+        is_enabled: bool = True,
         group: SubscriberGroup | None = None,
     ) -> LocalReader:
         """Create, announce and match a reader.  Raises NotAllowedBySecurity, and nothing has changed then.
@@ -376,10 +374,8 @@ class Participant:
         reader.uses_filter = uses_filter or content_filter is not None
         if content_filter is not None:
             history.content_filter = ContentFilter(*content_filter)
-        self._readers_by_topic.setdefault(topic_name, {})[guid] = reader
-        self.recorder.endpoint_created(data)
-        self.discovery.announce_reader(reader, now)
-        self.matchmaker.reader_appeared(reader, now)
+        if is_enabled:
+            self.user_endpoints.enable_reader(reader, now)
         return reader
 
     def set_content_filter(
@@ -409,12 +405,12 @@ class Participant:
         self.matchmaker.writer_gone(writer, now)
         self.presentation.writer_gone(writer)
         self.hooks.local_endpoint_deleted(writer.guid)
-        self.discovery.announce_gone(writer, now)
         self.closing.discard(writer.guid)
         del self.local_writers[writer.guid]
-        _remove_from_topic(self._writers_by_topic, writer.data.topic_name, writer.guid)
         self.alarms.forget_writer(writer.guid)
-        self.recorder.endpoint_closed(writer.guid)
+        if self.user_endpoints.remove_writer(writer):
+            self.discovery.announce_gone(writer, now)
+            self.recorder.endpoint_closed(writer.guid)
 
     def linger_ended(self, writer: LocalWriter, now: float) -> None:
         """All was acknowledged, or a closed writer waited long enough."""
@@ -428,11 +424,11 @@ class Participant:
         self.matchmaker.reader_gone(reader, now)
         self.presentation.reader_gone(reader, now)
         self.hooks.local_endpoint_deleted(reader.guid)
-        self.discovery.announce_gone(reader, now)
         del self.local_readers[reader.guid]
         self.alarms.forget_reader(reader.guid)
-        _remove_from_topic(self._readers_by_topic, reader.data.topic_name, reader.guid)
-        self.recorder.endpoint_closed(reader.guid)
+        if self.user_endpoints.remove_reader(reader):
+            self.discovery.announce_gone(reader, now)
+            self.recorder.endpoint_closed(reader.guid)
 
     def close(self, now: float) -> None:
         """Goodbye: endpoints first, then the participant.  The effects that this leaves must still be drained."""
@@ -452,15 +448,11 @@ class Participant:
 
     def user_writers(self, topic_name: str | None = None) -> list[LocalWriter]:
         """The application's writers, of all topics or of one."""
-        if topic_name is not None:
-            return list(self._writers_by_topic.get(topic_name, {}).values())
-        return [writer for of_topic in self._writers_by_topic.values() for writer in of_topic.values()]
+        return self.user_endpoints.writers(topic_name)
 
     def user_readers(self, topic_name: str | None = None) -> list[LocalReader]:
         """The application's readers, of all topics or of one."""
-        if topic_name is not None:
-            return list(self._readers_by_topic.get(topic_name, {}).values())
-        return [reader for of_topic in self._readers_by_topic.values() for reader in of_topic.values()]
+        return self.user_endpoints.readers(topic_name)
 
     # --- writing -----------------------------------------------------------------------------------------
 
@@ -768,12 +760,6 @@ class Participant:
         key = self._next_entity_key
         self._next_entity_key += 1
         return Guid.of(self.guid.prefix, EntityId.user(key, kind))
-
-
-def _remove_from_topic(table: dict[str, dict[Guid, _Endpoint]], topic_name: str, guid: Guid) -> None:
-    del table[topic_name][guid]
-    if not table[topic_name]:
-        del table[topic_name]
 
 
 def _own_data(setup: ParticipantSetup, guid: Guid) -> DiscoveredParticipantData:
