@@ -341,7 +341,7 @@ class ValueReader:
         with source.block(f"for {', '.join(names)}, in {iterator}({octets}):"):
             emitter.emit_held()
             source.line(f"{value}.append({expression})")
-        emitter.move(end, before.meet(step.residue.advance(step.size)))
+        emitter.move(end, step.behind(before, count))
 
     def _octets_of_elements(self, count: str, step: Stride) -> str:
         """The expression of what the elements take, padding before the first of them included."""
@@ -354,7 +354,7 @@ class ValueReader:
             octets = f"{padding} + {octets}"
         elif not step.gap:
             return octets
-        return f"({octets} if {count} else 0)"
+        return octets if count.isdecimal() else f"({octets} if {count} else 0)"
 
     def _open_dheader(self, type_: IdlType) -> tuple[str, str] | None:
         if not has_dheader(type_, self._encoding):

@@ -33,6 +33,11 @@ class Stride:
         """From the start of an element to the start of the next."""
         return self.size + self.gap
 
+    def behind(self, start: Residue, count: str) -> Residue:
+        """What is known of the position behind ``count`` elements (a number, or a name) of a sequence at ``start``."""
+        behind = self.residue.advance(self.size)
+        return behind if count.isdecimal() else start.meet(behind)
+
 
 def stride(element: IdlType, start: Residue, encoding: Encoding) -> Stride | None:
     """The stride of elements behind ``start``; None unless each is one run of items, laid out as the others."""

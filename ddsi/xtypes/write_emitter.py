@@ -218,10 +218,10 @@ class WriteEmitter:
             self.flush()
         octets = f"{count} * {step.octets}"
         if step.gap:  # behind the last element there is none
-            self.source.line(f"if {count}: parts[-1] = parts[-1][:-{step.gap}]")
-            octets = f"({octets} - {step.gap} if {count} else 0)"
-        residue = start.residue.meet(step.residue.advance(step.size))
-        self.position = Position((*start.terms, octets), start.offset, residue)
+            condition = "" if count.isdecimal() else f"if {count}"
+            self.source.line(f"{condition}{condition and ': '}parts[-1] = parts[-1][:-{step.gap}]")
+            octets = f"({octets} - {step.gap}{condition and f' {condition} else 0'})"
+        self.position = Position((*start.terms, octets), start.offset, step.behind(start.residue, count))
 
     @contextmanager
     def branches(self) -> Iterator[Branches]:

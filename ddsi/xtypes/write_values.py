@@ -344,7 +344,10 @@ class ValueWriter:
 
     def _elements_by_stride(self, element: IdlType, value: str, count: str, step: Stride) -> None:
         """Only the first element is aligned: the others follow it as their layout says."""
-        self._align_elements(count, step.alignment)
+        if count.isdecimal():
+            self._emitter.align(step.alignment)
+        else:
+            self._align_elements(count, step.alignment)
         item = self._source.fresh("v")
         with self._emitter.repeat(f"for {item} in {value}:", count, step), self._plan.inlining_all():
             self.value(element, item)

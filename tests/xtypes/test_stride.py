@@ -42,6 +42,19 @@ def struct_of(kinds: list[Kind], extensibility: idl.Extensibility) -> Kind:
     return Kind(class_, st.builds(class_, *[kind.values for kind in kinds]))
 
 
+@idl.struct(extensibility=idl.FINAL)
+class Tag:
+    name: str
+    number: idl.int16
+
+
+@idl.struct
+class Tail:
+    """In XCDR2 its length is counted from where it begins, behind whatever was before it."""
+
+    tags: idl.sequence[Tag]
+
+
 @st.composite
 def samples(draw: st.DrawFn) -> Any:
     """Something of any length, then a sequence or an array of structs of fixed size, then something that is aligned."""
@@ -57,12 +70,16 @@ def samples(draw: st.DrawFn) -> Any:
     if count and draw(st.booleans()):
         elements = Annotated[elements, idl.array(count)]
     before = draw(st.sampled_from([str, idl.int8, idl.int32, idl.float64]))
-    annotations: dict[str, Any] = {"before": before, "elements": elements, "behind": idl.float64}
+    annotations: dict[str, Any] = {"before": before, "elements": elements, "behind": idl.float64, "tail": Tail}
     if draw(st.booleans()):
         del annotations["before"]
     extensibility = draw(st.sampled_from(list(idl.Extensibility)))
     class_: Any = idl.struct(extensibility=extensibility)(type("Holder", (), {"__annotations__": annotations}))
-    members = {"elements": draw(st.lists(element.values, min_size=count, max_size=count)), "behind": 1.5}
+    members: dict[str, Any] = {
+        "elements": draw(st.lists(element.values, min_size=count, max_size=count)),
+        "behind": 1.5,
+    }
+    members["tail"] = Tail([Tag("a", 1)] * draw(st.integers(0, 2)))
     if "before" in annotations:
         members["before"] = "x" * draw(st.integers(0, 8)) if before is str else 1
     return class_(**members)
@@ -94,7 +111,7 @@ def test_what_is_cut_off_or_changed_is_refused_or_read_alike(sample: Any, data: 
         except Exception:
             read = None
         if read is not None:
-            assert support.serializer(XCDR1)(read_carefully(support.struct, changed)) == support.serializer(XCDR1)(read)
+            assert repr(read_carefully(support.struct, changed)) == repr(read)  # equal, NaN included
 
 
 @idl.struct(extensibility=idl.FINAL)
