@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
-from .idl_compiler.python_names import literal_identifier, python_identifier
+from .idl_compiler.python_identifiers import literal_identifier, python_identifier
 
 __all__ = ["class_name", "literal_name", "member_name"]
 

@@ -6,38 +6,12 @@ before it.  A member or literal whose name is no name in Python gets an undersco
 
 from __future__ import annotations
 
-import keyword
 from collections.abc import Iterable
 
 from .declarations import Declaration, Module
+from .python_identifiers import literal_identifier, literal_name_in_idl, python_identifier
 
 __all__ = ["literal_identifier", "literal_name_in_idl", "python_identifier", "python_names"]
-
-_USED_BY_GENERATED_SOURCE = frozenset(
-    ("Annotated", "Final", "TypeAlias", "annotations", "bool", "enum", "field", "float", "idl", "int", "str")
-)
-
-_ENUM_ATTRIBUTES = frozenset(("mro", "name", "value"))
-
-
-def python_identifier(name: str, taken: Iterable[str] = ()) -> str:
-    """The name, with underscores behind it until it is one in Python and not taken."""
-    if name.startswith("__"):  # Python would mangle it inside a class
-        name = "_" + name.lstrip("_")
-    while keyword.iskeyword(name) or name in _USED_BY_GENERATED_SOURCE or name in taken:
-        name += "_"
-    return name
-
-
-def literal_identifier(name: str) -> str:
-    """The name of an enum's literal, which must not be what every Python enum has."""
-    return python_identifier(name, _ENUM_ATTRIBUTES)
-
-
-def literal_name_in_idl(name: str) -> str:
-    """The other way: the name of a literal or flag without the underscores that only Python needs."""
-    bare = name.rstrip("_")
-    return bare if bare != name and literal_identifier(bare) == name else name
 
 
 def python_names(root: Module, declarations: Iterable[Declaration]) -> dict[Declaration, str]:
