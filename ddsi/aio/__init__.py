@@ -10,8 +10,10 @@ Cancelling a task cancels what it waits for in that thread.  Creating and closin
             print(sample.data)
 """
 
+from ..portal.conditions import GuardCondition, QueryCondition, ReadCondition, StatusCondition
 from .entities import (
     BuiltinTopicReader,
+    ContentFilteredTopic,
     DataReader,
     DataWriter,
     DomainParticipant,
@@ -19,15 +21,22 @@ from .entities import (
     Publisher,
     Subscriber,
     Topic,
+    WaitSet,
 )
 
 __all__ = [
     "BuiltinTopicReader",
+    "ContentFilteredTopic",
     "DataReader",
     "DataWriter",
     "DomainParticipant",
     "EventStream",
+    "GuardCondition",
     "Publisher",
+    "QueryCondition",
+    "ReadCondition",
+    "StatusCondition",
     "Subscriber",
     "Topic",
+    "WaitSet",
 ]

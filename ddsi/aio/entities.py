@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Callable, Iterable
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, Generic, Self, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, Unpack
 
 from .. import dcps
 from ..config import Config
 from ..dcps.data_writer import Timestamp
+from ..portal.conditions import WaitSetPortal
+from ..portal.endpoints import InstanceSelection, ReaderPortal, SampleReaderPortal, Selection, WriterPortal
 from ..portal.entities import (
     EntityPortal,
-    GroupPortal,
+    FilteredTopicPortal,
     ParticipantPortal,
-    ReaderPortal,
-    SampleReaderPortal,
-    Selection,
+    PublisherPortal,
+    SubscriberPortal,
     TopicPortal,
-    WriterPortal,
     check_parent,
 )
 from ..structure.builtin_topic_data import (
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuiltinTopicReader",
+    "ContentFilteredTopic",
     "DataReader",
     "DataWriter",
     "DomainParticipant",
@@ -46,6 +47,7 @@ __all__ = [
     "Publisher",
     "Subscriber",
     "Topic",
+    "WaitSet",
 ]
 
 T = TypeVar("T")
@@ -137,21 +139,34 @@ class DomainParticipant(_Async, ParticipantPortal):
         """Until the tables of remote participants and endpoints change.  Raises AlreadyDeleted."""
         await self._engine.run_for_asyncio(self._inner.wait_for_discovery)
 
+    async def discover_type(self, topic_name: str, *, timeout: float | None = 10.0) -> type[Any]:
+        """The type of a topic that others write or read: see ``ddsi.DomainParticipant.discover_type``."""
+        return await self._engine.run_for_asyncio(self._inner.discover_type, topic_name, timeout=timeout)
+
 
 class Topic(_Async, TopicPortal[T], Generic[T]):
     """What writers and readers agree on: the topic's name and the type of its samples."""
 
 
-class Publisher(_Async, GroupPortal):
+class ContentFilteredTopic(_Async, FilteredTopicPortal[T], Generic[T]):
+    """Given to a DataReader in a Topic's place, lets it see only what passes: see ``ddsi.ContentFilteredTopic``."""
+
+
+class Publisher(_Async, PublisherPortal):
     """The writers created with it have its policies wherever they do not set their own."""
 
-    _KIND = dcps.Publisher
 
-
-class Subscriber(_Async, GroupPortal):
+class Subscriber(_Async, SubscriberPortal):
     """The readers created with it have its policies wherever they do not set their own."""
 
-    _KIND = dcps.Subscriber
+    async def get_datareaders(self, **selection: Unpack[InstanceSelection]) -> list[DataReader[Any]]:
+        """The readers that have samples in these states: see ``ddsi.Subscriber.get_datareaders``."""
+        found = await self._engine.run_for_asyncio(_soon, partial(self._inner.get_datareaders, **selection))
+        return [reader for inner in found if isinstance(reader := self._readers.get(inner), DataReader)]
+
+    async def wait(self) -> None:
+        """Until one of the readers has a sample that has not been read.  Raises AlreadyDeleted."""
+        await self._engine.run_for_asyncio(self._inner.wait)
 
 
 class DataWriter(_Async, WriterPortal[T], Generic[T]):
@@ -219,6 +234,20 @@ class _Reading(_Async, SampleReaderPortal[T], Generic[T]):
         """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
         return await self._engine.run_for_asyncio(_soon, partial(self._source.read, max_samples, **selection))
 
+    async def take_next_instance(
+        self, previous: bytes | None, max_samples: int | None = None, **selection: Unpack[InstanceSelection]
+    ) -> list[dcps.Sample[T]]:
+        """As :meth:`take`, of the first instance behind the handle ``previous`` that has such samples."""
+        take = partial(self._source.take_next_instance, previous, max_samples, **selection)
+        return await self._engine.run_for_asyncio(_soon, take)
+
+    async def read_next_instance(
+        self, previous: bytes | None, max_samples: int | None = None, **selection: Unpack[InstanceSelection]
+    ) -> list[dcps.Sample[T]]:
+        """As :meth:`take_next_instance`, but the samples stay and count as read."""
+        read = partial(self._source.read_next_instance, previous, max_samples, **selection)
+        return await self._engine.run_for_asyncio(_soon, read)
+
     async def wait(self, condition: dcps.ReadCondition | None = None) -> None:
         """Until there is a sample that fits ``condition`` (none given: one that has not been read).
 
@@ -230,7 +259,12 @@ class _Reading(_Async, SampleReaderPortal[T], Generic[T]):
 class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
     """Reads samples of a topic: ``async for sample in reader``, or ``take`` and ``read``."""
 
-    def __init__(self, parent: DomainParticipant | Subscriber, topic: Topic[T], qos: Qos | None = None) -> None:
+    def __init__(
+        self,
+        parent: DomainParticipant | Subscriber,
+        topic: Topic[T] | ContentFilteredTopic[T],
+        qos: Qos | None = None,
+    ) -> None:
         """Raises InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted; then nothing has been created."""
         ReaderPortal.__init__(self, parent, topic, qos)
 
@@ -252,6 +286,14 @@ class BuiltinTopicReader(_Reading[B], Generic[B]):
         self._participant = participant
         inner = participant._ask(partial(dcps.BuiltinTopicReader, participant._inner, kind))
         super().__init__(participant._engine, inner)
+
+
+class WaitSet(WaitSetPortal):
+    """Waits for any of several conditions: see ``ddsi.WaitSet``."""
+
+    async def wait(self, timeout: float | None = None) -> list[dcps.Condition]:
+        """The conditions that hold; waits until one does.  Raises DdsTimeout, AlreadyDeleted."""
+        return await self._engine.run_for_asyncio(self._inner.wait, timeout)
 
 
 async def _soon(function: Callable[[], T]) -> T:

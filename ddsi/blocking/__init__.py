@@ -10,8 +10,10 @@ DESIGN: ``ddsi/portal/engine_thread.py``.
             print(sample.data)
 """
 
+from ..portal.conditions import GuardCondition, QueryCondition, ReadCondition, StatusCondition
 from .entities import (
     BuiltinTopicReader,
+    ContentFilteredTopic,
     DataReader,
     DataWriter,
     DomainParticipant,
@@ -19,17 +21,24 @@ from .entities import (
     Publisher,
     Subscriber,
     Topic,
+    WaitSet,
 )
 from .listener import Listener
 
 __all__ = [
     "BuiltinTopicReader",
+    "ContentFilteredTopic",
     "DataReader",
     "DataWriter",
     "DomainParticipant",
     "EventStream",
+    "GuardCondition",
     "Listener",
     "Publisher",
+    "QueryCondition",
+    "ReadCondition",
+    "StatusCondition",
     "Subscriber",
     "Topic",
+    "WaitSet",
 ]

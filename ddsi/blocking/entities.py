@@ -6,24 +6,24 @@ errors are those of ``ddsi``; what differs is said here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, Generic, Self, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, Unpack
 
 from .. import dcps
 from ..config import Config
 from ..dcps.data_writer import Timestamp
 from ..dcps.entity import deadline_scope
+from ..portal.conditions import WaitSetPortal
+from ..portal.endpoints import InstanceSelection, ReaderPortal, SampleReaderPortal, Selection, WriterPortal
 from ..portal.entities import (
     EntityPortal,
-    GroupPortal,
+    FilteredTopicPortal,
     ParticipantPortal,
-    ReaderPortal,
-    SampleReaderPortal,
-    Selection,
+    PublisherPortal,
+    SubscriberPortal,
     TopicPortal,
-    WriterPortal,
     check_parent,
 )
 from ..structure.builtin_topic_data import (
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuiltinTopicReader",
+    "ContentFilteredTopic",
     "DataReader",
     "DataWriter",
     "DomainParticipant",
@@ -48,6 +49,7 @@ __all__ = [
     "Publisher",
     "Subscriber",
     "Topic",
+    "WaitSet",
 ]
 
 T = TypeVar("T")
@@ -153,29 +155,36 @@ class DomainParticipant(_Blocking, ParticipantPortal):
     def wait_for_discovery(self, timeout: float | None = None) -> None:
         """Until the tables of remote participants and endpoints change.  Raises DdsTimeout, AlreadyDeleted."""
 
-        async def wait() -> None:
-            with deadline_scope(timeout):
-                await self._inner.wait_for_discovery()
-                return
-            raise DdsTimeout(f"{self._inner!r}: nothing changed in {timeout} s; `ddsi ls` shows who is there")
+        self._engine.run(_in_time, self._inner.wait_for_discovery, timeout, f"{self._inner!r}: nothing changed")
 
-        self._engine.run(wait)
+    def discover_type(self, topic_name: str, *, timeout: float | None = 10.0) -> type[Any]:
+        """The type of a topic that others write or read: see ``ddsi.DomainParticipant.discover_type``."""
+        return self._engine.run(self._inner.discover_type, topic_name, timeout=timeout)
 
 
 class Topic(_Blocking, TopicPortal[T], Generic[T]):
     """What writers and readers agree on: the topic's name and the type of its samples."""
 
 
-class Publisher(_Blocking, GroupPortal):
+class ContentFilteredTopic(_Blocking, FilteredTopicPortal[T], Generic[T]):
+    """Given to a DataReader in a Topic's place, lets it see only what passes: see ``ddsi.ContentFilteredTopic``."""
+
+
+class Publisher(_Blocking, PublisherPortal):
     """The writers created with it have its policies wherever they do not set their own."""
 
-    _KIND = dcps.Publisher
 
-
-class Subscriber(_Blocking, GroupPortal):
+class Subscriber(_Blocking, SubscriberPortal):
     """The readers created with it have its policies wherever they do not set their own."""
 
-    _KIND = dcps.Subscriber
+    def get_datareaders(self, **selection: Unpack[InstanceSelection]) -> list[DataReader[Any]]:
+        """The readers that have samples in these states: see ``ddsi.Subscriber.get_datareaders``."""
+        found = self._ask(partial(self._inner.get_datareaders, **selection))
+        return [reader for inner in found if isinstance(reader := self._readers.get(inner), DataReader)]
+
+    def wait(self, timeout: float | None = None) -> None:
+        """Until one of the readers has a sample that has not been read.  Raises DdsTimeout, AlreadyDeleted."""
+        self._engine.run(_in_time, self._inner.wait, timeout, f"{self._entity!r}: no samples")
 
 
 class DataWriter(_Blocking, WriterPortal[T], Generic[T]):
@@ -248,19 +257,25 @@ class _Reading(_Blocking, SampleReaderPortal[T], Generic[T]):
         """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
         return self._engine.run_now(partial(self._source.read, max_samples, **selection))
 
+    def take_next_instance(
+        self, previous: bytes | None, max_samples: int | None = None, **selection: Unpack[InstanceSelection]
+    ) -> list[dcps.Sample[T]]:
+        """As :meth:`take`, of the first instance behind the handle ``previous`` that has such samples."""
+        return self._ask(partial(self._source.take_next_instance, previous, max_samples, **selection))
+
+    def read_next_instance(
+        self, previous: bytes | None, max_samples: int | None = None, **selection: Unpack[InstanceSelection]
+    ) -> list[dcps.Sample[T]]:
+        """As :meth:`take_next_instance`, but the samples stay and count as read."""
+        return self._ask(partial(self._source.read_next_instance, previous, max_samples, **selection))
+
     def wait(self, condition: dcps.ReadCondition | None = None, timeout: float | None = None) -> None:
         """Until there is a sample that fits ``condition`` (none given: one that has not been read).
 
         Raises DdsTimeout after ``timeout`` seconds; AlreadyDeleted, also when the reader is closed meanwhile.
         """
 
-        async def wait() -> None:
-            with deadline_scope(timeout):
-                await self._wait_now(condition)
-                return
-            raise DdsTimeout(f"{self._entity!r}: no such sample in {timeout} s")
-
-        self._engine.run(wait)
+        self._engine.run(_in_time, partial(self._wait_now, condition), timeout, f"{self._entity!r}: no such sample")
 
 
 class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
@@ -269,7 +284,7 @@ class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
     def __init__(
         self,
         parent: DomainParticipant | Subscriber,
-        topic: Topic[T],
+        topic: Topic[T] | ContentFilteredTopic[T],
         qos: Qos | None = None,
         *,
         listener: Listener | None = None,
@@ -297,3 +312,18 @@ class BuiltinTopicReader(_Reading[B], Generic[B]):
         inner = participant._ask(partial(dcps.BuiltinTopicReader, participant._inner, kind))
         super().__init__(participant._engine, inner)
         self.set_listener(listener)
+
+
+class WaitSet(WaitSetPortal):
+    """Waits for any of several conditions: see ``ddsi.WaitSet``."""
+
+    def wait(self, timeout: float | None = None) -> list[dcps.Condition]:
+        """The conditions that hold; waits until one does.  Raises DdsTimeout, AlreadyDeleted."""
+        return self._engine.run(self._inner.wait, timeout)
+
+
+async def _in_time(wait: Callable[[], Awaitable[None]], timeout: float | None, otherwise: str) -> None:
+    with deadline_scope(timeout):
+        await wait()
+        return
+    raise DdsTimeout(f"{otherwise} in {timeout} s")

@@ -12,10 +12,7 @@ import logging
 import threading
 from typing import TYPE_CHECKING, Any
 
-import trio
-
 from .. import dcps
-from ..behavior.reader_history_cache import ReaderHistoryCache
 from ..dcps.sample_reader import SampleReader
 from ..structure import status as s
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsError
@@ -37,6 +34,9 @@ class Listener:
 
     def on_data_available(self, reader: Any) -> None:
         """Samples have come since the last call began; several arrivals may be one call."""
+
+    def on_data_on_readers(self, subscriber: Any) -> None:
+        """As :meth:`on_data_available`, of any reader of the subscriber that it was given to."""
 
     def on_publication_matched(self, writer: Any, status: s.PublicationMatched) -> None:
         """A writer gained or lost a matched reader."""
@@ -106,43 +106,56 @@ class Listening:
         self._engine = entity._engine
         self._inner = entity._entity
         self._listener = listener
-        self._events: dcps.EventStream = self._engine.run_now(self._inner.events)
         self._is_stopped = False
+        self._had_data = False
+        self._events: dcps.EventStream = self._engine.run_now(self._begin)
         threading.Thread(target=self._run, name="ddsi listener", daemon=True).start()
 
     def stop(self) -> None:
         """No more calls begin.  One that goes on is not waited for: it may be the one that asks."""
         self._is_stopped = True
-        self._engine.post(self._inner._changed.unpark_all)
+        self._engine.post(self._events.close)
 
     def _run(self) -> None:
+        if self._had_data:
+            self._call(s.DataAvailable())
         while True:
             try:
                 happened = self._engine.run(self._next)
             except DdsError:  # the participant has gone altogether
                 return
-            if self._is_stopped or happened is None:
+            if happened is None or self._is_stopped:
                 return
-            try:
-                if isinstance(happened, ReaderHistoryCache):
-                    self._listener.on_data_available(self._entity)
-                elif method := _METHODS.get(type(happened)):
-                    getattr(self._listener, method)(self._entity, happened)
-            except Exception as error:
-                if not (isinstance(error, AlreadyDeleted) and self._inner.is_closed):  # it was closed under its hands
-                    _log.exception("%r failed", self._listener)
+            self._call(happened)
 
-    async def _next(self) -> Status | ReaderHistoryCache | None:
-        """In the engine's thread: what happens next; the cache for the arrival of data, None at the end."""
-        history = self._inner._history if isinstance(self._inner, SampleReader) else None
-        await trio.lowlevel.checkpoint_if_cancelled()
-        while not self._is_stopped:
-            if (event := self._events.poll()) is not None:
-                return event
+    def _call(self, happened: Status) -> None:
+        try:
+            if isinstance(happened, s.DataAvailable):
+                self._listener.on_data_available(self._entity)
+            elif isinstance(happened, s.DataOnReaders):
+                self._listener.on_data_on_readers(self._entity)
+            elif method := _METHODS.get(type(happened)):
+                getattr(self._listener, method)(self._entity, happened)
+        except Exception as error:
+            if not (isinstance(error, AlreadyDeleted) and self._inner.is_closed):  # it was closed under its hands
+                _log.exception("%r failed", self._listener)
+
+    def _begin(self) -> dcps.EventStream:
+        """In the engine's thread: listen, and look whether there are data already, of which no event tells."""
+        if isinstance(self._inner, SampleReader) and self._inner._history.has_news:
+            self._had_data = True
+            self._inner._history.seen()
+        return self._inner.events()
+
+    async def _next(self) -> Status | None:
+        """In the engine's thread: what happens next; None at the end."""
+        try:
+            happened = await self._events.__anext__()
+        except StopAsyncIteration:
+            return None
+        if isinstance(happened, s.DataAvailable) and isinstance(self._inner, SampleReader):
             if self._inner.is_closed:
-                break
-            if history is not None and history.has_news:
-                history.seen()  # so that the next arrival counts as one, whether or not the listener takes this
-                return history
-            await self._inner._changed.park()  # which statuses, data and the end all tell
-        return None
+                return None
+            # So that the next arrival is told of too, whether or not the listener takes this one.
+            self._inner._history.seen()
+        return happened

@@ -59,10 +59,6 @@ class EventStream(AsyncIterator[Status]):
         self._is_closed = True
         self._lot.unpark_all()
 
-    def poll(self) -> Status | None:
-        """The next event that is here already, if there is one; never waits."""
-        return self._events.popleft() if self._events else None
-
     def __aiter__(self) -> EventStream:
         return self
 

@@ -81,6 +81,10 @@ class EngineThread:
         self._pending.discard(call)
         return call.outcome()
 
+    def within(self, function: Callable[[], R]) -> R:
+        """As :meth:`run_now`, also from the engine's thread itself."""
+        return function() if threading.current_thread() is self._thread else self.run_now(function)
+
     def run(self, function: Callable[P, Awaitable[R]], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Have the async ``function`` run in the engine's thread, and wait for it.
 

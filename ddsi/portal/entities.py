@@ -8,25 +8,20 @@ from __future__ import annotations
 
 import warnings
 import weakref
-from collections import Counter, deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
 
 from .. import dcps
 from ..config import Config
 from ..discovery.matching import MatchRefusal
-from ..structure.builtin_topic_data import (
-    ParticipantBuiltinTopicData,
-    PublicationBuiltinTopicData,
-    SubscriptionBuiltinTopicData,
-)
+from ..structure.builtin_topic_data import ParticipantBuiltinTopicData
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import AlreadyDeleted, BadParameter
 from ..structure.guid import Guid
-from ..structure.qos import EndpointQos, Qos
-from .call import Lane
+from ..structure.qos import Qos
 from .engine_thread import EngineThread, engine_thread
 from .stay import Stay
 
@@ -35,28 +30,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "EntityPortal",
+    "FilteredTopicPortal",
     "GroupPortal",
     "ParticipantPortal",
-    "ReaderPortal",
-    "SampleReaderPortal",
-    "Selection",
+    "PublisherPortal",
+    "SubscriberPortal",
     "TopicPortal",
-    "WriterPortal",
+    "check_parent",
 ]
 
 T = TypeVar("T")
 S = TypeVar("S")
-_FETCHED_AT_ONCE = 64
-
-
-class Selection(TypedDict, total=False):
-    """The keywords of ``take`` and ``read``; their meaning and defaults are those of ``ddsi.DataReader.take``."""
-
-    condition: dcps.ReadCondition | None
-    sample_states: int
-    view_states: int
-    instance_states: int
-    instance: bytes | None
 
 
 class EntityPortal:
@@ -89,8 +73,12 @@ class EntityPortal:
         return self._entity.is_closed
 
     def status(self, kind: type[S]) -> S:
-        """The present value of one status.  Raises BadParameter where an entity of this kind has no such status."""
-        return self._entity.status(kind)
+        """The present value of one status: see ``ddsi.Entity.status``."""
+        return self._ask(partial(self._entity.status, kind))
+
+    def status_changes(self) -> frozenset[type]:
+        """The kinds of status that have changed since they were read by :meth:`status`."""
+        return self._ask(self._entity.status_changes)
 
     def close(self) -> None:
         """End the entity; what it held is released at once, and peers are told.  Safe twice."""
@@ -179,6 +167,11 @@ class ParticipantPortal(EntityPortal):
         """Say that all writers of manual-by-participant liveliness are alive."""
         self._ask(self._inner.assert_liveliness)
 
+    def _running_engine(self) -> EngineThread:
+        """Raises PreconditionNotMet (not entered yet) and AlreadyDeleted, as everything that needs one that is open."""
+        _ = self._inner.guid
+        return self._engine
+
     def _ask(self, function: Callable[[], S]) -> S:
         """As of any entity; of a participant that is not there, what it says of itself."""
         if self._stay is None or self._inner.is_closed:
@@ -211,159 +204,130 @@ class TopicPortal(EntityPortal, Generic[T]):
         return self._inner.type_name
 
 
+class FilteredTopicPortal(EntityPortal, Generic[T]):
+    """Given to a reader in a topic's place, lets it see only what passes."""
+
+    STATUSES = dcps.ContentFilteredTopic.STATUSES
+
+    def __init__(
+        self,
+        participant: ParticipantPortal,
+        name: str,
+        topic: TopicPortal[T],
+        expression: str,
+        parameters: Sequence[str] = (),
+    ) -> None:
+        """As ``ddsi.ContentFilteredTopic``; ``participant`` and ``topic`` are of this module."""
+        check_parent(participant, ParticipantPortal)
+        check_parent(topic, TopicPortal)
+        self._participant = participant
+        self._topic = topic
+        create = partial(dcps.ContentFilteredTopic, participant._inner, name, topic._inner, expression, parameters)
+        self._inner: dcps.ContentFilteredTopic[T] = participant._ask(create)
+        super().__init__(participant._engine, self._inner)
+
+    @property
+    def name(self) -> str:
+        return self._inner.name
+
+    @property
+    def related_topic(self) -> TopicPortal[T]:
+        return self._topic
+
+    @property
+    def filter_expression(self) -> str:
+        return self._inner.filter_expression
+
+    @property
+    def expression_parameters(self) -> tuple[str, ...]:
+        return self._inner.expression_parameters
+
+    def set_expression_parameters(self, parameters: Sequence[str]) -> None:
+        """From now on these are the values of %0, %1 and so on: see ``ddsi.ContentFilteredTopic``."""
+        self._ask(partial(self._inner.set_expression_parameters, parameters))
+
+
 class GroupPortal(EntityPortal):
     """A publisher or a subscriber."""
 
-    _KIND: ClassVar[type[dcps.Publisher] | type[dcps.Subscriber]]
+    def __init__(self, participant: ParticipantPortal, create: Callable[[], dcps.Publisher | dcps.Subscriber]) -> None:
+        self._participant = participant
+        self._inner = participant._ask(create)
+        super().__init__(participant._engine, self._inner)
+
+
+class PublisherPortal(GroupPortal):
+    """A publisher.  Other threads may write meanwhile: what they write into a coherent set is in it."""
+
+    _inner: dcps.Publisher
 
     def __init__(self, participant: ParticipantPortal, qos: Qos | None = None) -> None:
-        """As ``ddsi.Publisher`` and ``ddsi.Subscriber``; ``participant`` is one of this module's."""
+        """As ``ddsi.Publisher``; ``participant`` is one of this module's."""
         check_parent(participant, ParticipantPortal)
-        self._participant = participant
-        self._inner = participant._ask(partial(self._KIND, participant._inner, qos))
-        super().__init__(participant._engine, self._inner)
+        super().__init__(participant, partial(dcps.Publisher, participant._inner, qos))
 
+    def begin_coherent_changes(self) -> None:
+        """See ``ddsi.Publisher.begin_coherent_changes``."""
+        self._ask(self._inner.begin_coherent_changes)
 
-class WriterPortal(EntityPortal, Generic[T]):
-    """A writer, and the lane in which its writes go one after the other."""
+    def end_coherent_changes(self) -> None:
+        """The set is whole."""
+        self._ask(self._inner.end_coherent_changes)
 
-    STATUSES = dcps.DataWriter.STATUSES
-
-    def __init__(self, parent: ParticipantPortal | GroupPortal, topic: TopicPortal[T], qos: Qos | None = None) -> None:
-        """As ``ddsi.DataWriter``; ``parent`` and ``topic`` are of this module."""
-        check_parent(parent, ParticipantPortal, GroupPortal)
-        check_parent(topic, TopicPortal)
-        self._parent = parent
-        self._topic = topic
-        participant = topic._participant
-        self._lane = Lane()
-
-        def create() -> dcps.DataWriter[T]:
-            writer: dcps.DataWriter[T] = dcps.DataWriter(parent._inner, topic._inner, qos)  # type: ignore[arg-type]
-            participant._engine.begin(self._lane.run)
-            return writer
-
-        self._inner = participant._ask(create)
-        # A lane that nobody puts anything into any more ends, and with it the task.
-        weakref.finalize(self, participant._engine.post, self._lane.close).atexit = False
-        super().__init__(participant._engine, self._inner)
-
-    @property
-    def topic(self) -> TopicPortal[T]:
-        return self._topic
-
-    @property
-    def guid(self) -> Guid:
-        return self._inner.guid
-
-    @property
-    def endpoint_qos(self) -> EndpointQos:
-        """Every policy as it holds for this writer, defaults filled in."""
-        return self._inner.endpoint_qos
-
-    def matched_subscriptions(self) -> list[Guid]:
-        """The Guids of the readers that are matched now."""
-        return self._engine.run_now(self._inner.matched_subscriptions)
-
-    def matched_subscription_data(self, handle: Guid) -> SubscriptionBuiltinTopicData:
-        """See ``ddsi.DataWriter.matched_subscription_data``."""
-        return self._engine.run_now(self._inner.matched_subscription_data, handle)
-
-    def assert_liveliness(self) -> None:
-        """Say that this writer is alive, where its liveliness is manual."""
-        self._engine.run_now(self._inner.assert_liveliness)
-
-    def close(self) -> None:
-        """End the writer; writes that still wait raise AlreadyDeleted."""
-        self._engine.post(self._lane.close)
-        super().close()
-
-    async def _write_all(self, samples: list[T]) -> None:
-        for sample in samples:
-            await self._inner.write(sample)
-
-
-class SampleReaderPortal(EntityPortal, Generic[T]):
-    """What readers of topics and of builtin topics share.
-
-    Iteration fetches what is there, at most 64 samples at once, as crossing threads costs more than a sample does.
-    What was fetched and not yet handed out has been taken as far as the reader is concerned.
-    """
-
-    def __init__(self, engine: EngineThread, inner: dcps.DataReader[T] | dcps.BuiltinTopicReader[Any]) -> None:
-        super().__init__(engine, inner)
-        self._source = inner
-        self._fetched: deque[dcps.Sample[T]] = deque()
-
-    @property
-    def guid(self) -> Guid:
-        return self._source.guid
-
-    async def _fetch(self) -> None:
-        """In the engine's thread: wait for samples.  Leaves without any when the reader is closed."""
+    @contextmanager
+    def coherent_changes(self) -> Iterator[None]:
+        """``with publisher.coherent_changes():`` what is written in the body is one set; none if the body raises."""
+        changes = self._inner.coherent_changes()
+        self._ask(changes.__enter__)
         try:
-            self._fetched.append(await self._source.__anext__())
-        except StopAsyncIteration:
-            return
-        # No await from here on: a cancellation finds either nothing taken or all of it kept.
-        self._fetched.extend(self._source.take(_FETCHED_AT_ONCE - 1))
+            yield
+        except BaseException as error:
+            self._ask(partial(changes.__exit__, type(error), error, error.__traceback__))
+            raise
+        self._ask(partial(changes.__exit__, None, None, None))
 
-    def _take_now(self, max_samples: int | None, selection: Selection) -> list[dcps.Sample[T]]:
-        """In the engine's thread."""
-        fetched: list[dcps.Sample[T]] = []
-        if not any(value is not None for value in selection.values()):
-            while self._fetched and (max_samples is None or len(fetched) < max_samples):
-                fetched.append(self._fetched.popleft())
-        if max_samples is not None and len(fetched) >= max_samples > 0:
-            return fetched
-        rest = None if max_samples is None else max_samples - len(fetched)
-        return fetched + self._source.take(rest, **selection)
+    def suspend_publications(self) -> None:
+        """Until :meth:`resume_publications`, what the publisher's writers write is kept and not sent."""
+        self._ask(self._inner.suspend_publications)
 
-    async def _wait_now(self, condition: dcps.ReadCondition | None) -> None:
-        """In the engine's thread."""
-        if not self._fetched or condition is not None:
-            await self._source.wait(condition)
-
-    def close(self) -> None:
-        super().close()
-        self._fetched.clear()
+    def resume_publications(self) -> None:
+        """Send what was kept."""
+        self._ask(self._inner.resume_publications)
 
 
-class ReaderPortal(SampleReaderPortal[T]):
-    """A reader of a topic."""
+class SubscriberPortal(GroupPortal):
+    """A subscriber."""
 
-    STATUSES = dcps.DataReader.STATUSES
+    STATUSES = dcps.Subscriber.STATUSES
+    _inner: dcps.Subscriber
 
-    def __init__(self, parent: ParticipantPortal | GroupPortal, topic: TopicPortal[T], qos: Qos | None = None) -> None:
-        """As ``ddsi.DataReader``; ``parent`` and ``topic`` are of this module."""
-        check_parent(parent, ParticipantPortal, GroupPortal)
-        check_parent(topic, TopicPortal)
-        self._parent = parent
-        self._topic = topic
-        create = partial(dcps.DataReader, parent._inner, topic._inner, qos)  # type: ignore[arg-type]
-        self._inner: dcps.DataReader[T] = topic._participant._ask(create)
-        super().__init__(topic._participant._engine, self._inner)
+    def __init__(self, participant: ParticipantPortal, qos: Qos | None = None) -> None:
+        """As ``ddsi.Subscriber``; ``participant`` is one of this module's."""
+        check_parent(participant, ParticipantPortal)
+        self._readers: dict[dcps.Entity, EntityPortal] = {}  # that stand for those of the inner subscriber
+        super().__init__(participant, partial(dcps.Subscriber, participant._inner, qos))
 
-    @property
-    def topic(self) -> TopicPortal[T]:
-        return self._topic
+    def begin_access(self) -> None:
+        """See ``ddsi.Subscriber.begin_access``."""
+        self._ask(self._inner.begin_access)
 
-    @property
-    def endpoint_qos(self) -> EndpointQos:
-        """Every policy as it holds for this reader, defaults filled in."""
-        return self._inner.endpoint_qos
+    def end_access(self) -> None:
+        """What has come meanwhile becomes visible."""
+        self._ask(self._inner.end_access)
 
-    def lookup_instance(self, sample: T) -> bytes | None:
-        """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
-        return self._engine.run_now(self._inner.lookup_instance, sample)
+    @contextmanager
+    def access(self) -> Iterator[Self]:
+        """``with subscriber.access():`` :meth:`begin_access` and :meth:`end_access` around the body."""
+        self.begin_access()
+        try:
+            yield self
+        finally:
+            if not self.is_closed:
+                self.end_access()
 
-    def matched_publications(self) -> list[Guid]:
-        """The Guids of the writers that are matched now."""
-        return self._engine.run_now(self._inner.matched_publications)
-
-    def matched_publication_data(self, handle: Guid) -> PublicationBuiltinTopicData:
-        """See ``ddsi.DataReader.matched_publication_data``."""
-        return self._engine.run_now(self._inner.matched_publication_data, handle)
+    def notify_datareaders(self) -> None:
+        """Wake whoever waits for one of the readers that has samples."""
+        self._ask(self._inner.notify_datareaders)
 
 
 def check_parent(given: object, *kinds: type[EntityPortal]) -> None:

@@ -286,3 +286,30 @@ def test_two_loops_in_two_threads_share_the_engine(domain: int) -> None:
         thread.join(20)
     assert len(engines) == 2
     assert engines[0] is engines[1]
+
+
+@in_asyncio
+async def test_conditions_filters_and_groups(domain: int) -> None:
+    async with aio.DomainParticipant(domain) as participant:
+        topic = aio.Topic(participant, "Square", Shape)
+        filtered = aio.ContentFilteredTopic(participant, "Big", topic, "x > %0", ["5"])
+        subscriber = aio.Subscriber(participant)
+        reader = aio.DataReader(subscriber, filtered, RELIABLE)
+        assert_type(reader, aio.DataReader[Shape])
+        writer = aio.DataWriter(participant, topic, RELIABLE)
+        guard = aio.GuardCondition(participant)
+        seven = aio.QueryCondition(reader, expression="x = 7")
+        waiting = asyncio.create_task(aio.WaitSet(participant, guard, seven).wait(timeout=10))
+        await writer.write_all([Shape("a", 1), Shape("b", 6), Shape("c", 7)])
+        assert await waiting == [seven]
+        await subscriber.wait()
+        assert await subscriber.get_datareaders() == [reader]
+        (first,) = await reader.read_next_instance(None)
+        assert first.data == Shape("b", 6)
+        (second,) = await reader.take_next_instance(first.info.instance_handle)
+        assert second.data == Shape("c", 7)
+        assert await reader.take(condition=seven) == []
+        waiting = asyncio.create_task(aio.WaitSet(participant, guard).wait())
+        await asyncio.sleep(0)
+        guard.set_trigger_value(True)
+        assert await waiting == [guard]

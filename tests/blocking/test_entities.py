@@ -12,6 +12,7 @@ import pytest
 
 import ddsi
 from ddsi import blocking
+from ddsi.portal.entities import TopicPortal
 from tests.dcps.running import RELIABLE, Note, Shape
 
 
@@ -57,6 +58,14 @@ def test_samples_go_from_a_participant_to_another_in_order(domain: int) -> None:
         end = next(reader)
         assert end.info.instance_state is ddsi.InstanceState.NOT_ALIVE_DISPOSED
         writer.unregister(Shape("BLUE"))
+
+
+def test_iteration_hands_out_samples_in_the_order_in_which_they_came(domain: int) -> None:
+    """Not instance by instance, as take does."""
+    with blocking.DomainParticipant(domain) as participant:
+        pair = Pair(participant)
+        pair.writer.write_all(Shape("abc"[number % 3], number) for number in range(200))
+        assert [next(pair.reader).data.x for _ in range(200)] == list(range(200))
 
 
 def test_what_iteration_fetched_ahead_is_handed_out_by_take_and_ends_a_wait(domain: int) -> None:
@@ -276,3 +285,87 @@ def test_entities_of_a_closed_participant_say_so(domain: int) -> None:
             operation()
     assert list(pair.reader) == []
     pair.reader.close()
+
+
+def test_conditions_and_wait_sets(domain: int) -> None:
+    with blocking.DomainParticipant(domain) as participant:
+        pair = Pair(participant)
+        guard = blocking.GuardCondition(participant)
+        big = blocking.QueryCondition(pair.reader, expression="x > %0", parameters=["2"])
+        any_data = blocking.ReadCondition(pair.reader)
+        matched = blocking.StatusCondition(pair.writer, ddsi.PublicationMatched)
+        waiting = blocking.WaitSet(participant, guard, big)
+        with pytest.raises(ddsi.DdsTimeout, match="2 conditions"):
+            waiting.wait(timeout=0.01)
+        pair.writer.write_all([Shape("RED", 1), Shape("RED", 3)])
+        assert waiting.wait(timeout=5) == [big]
+        assert any_data.trigger_value
+        assert [sample.data.x for sample in pair.reader.take(condition=big)] == [3]
+        big.set_query_parameters(["0"])
+        assert big.trigger_value
+        waiting.detach(big)
+        setting = _in_thread(lambda: guard.set_trigger_value(True))
+        assert waiting.wait(timeout=5) == [guard]
+        setting.join()
+        waiting.attach(matched)
+        assert waiting.conditions == (guard, matched)
+        assert matched.trigger_value
+        assert pair.writer.status_changes() == {ddsi.PublicationMatched}
+        assert pair.writer.status(ddsi.PublicationMatched).current_count_change == 1
+        assert not matched.trigger_value
+    with pytest.raises(ddsi.AlreadyDeleted):
+        blocking.WaitSet(participant, guard)
+
+
+def test_content_filters_and_instances_one_after_the_other(domain: int) -> None:
+    with blocking.DomainParticipant(domain) as participant:
+        topic = blocking.Topic(participant, "Square", Shape)
+        only_big = blocking.ContentFilteredTopic(participant, "Big", topic, "x > %0", ["5"])
+        assert_type(only_big.related_topic, TopicPortal[Shape])
+        assert (only_big.filter_expression, only_big.expression_parameters) == ("x > %0", ("5",))
+        reader = blocking.DataReader(participant, only_big, RELIABLE)
+        assert_type(reader, blocking.DataReader[Shape])
+        writer = blocking.DataWriter(participant, topic, RELIABLE)
+        writer.write_all([Shape("a", 1), Shape("b", 6), Shape("c", 7)])
+        only_big.set_expression_parameters(["0"])
+        writer.write(Shape("a", 2))
+        first = reader.read_next_instance(None)
+        assert [sample.data for sample in first] == [Shape("a", 2)]
+        second = reader.take_next_instance(first[0].info.instance_handle)
+        assert [sample.data for sample in second] == [Shape("b", 6)]
+        assert sorted(sample.data.x for sample in reader.take()) == [2, 7]
+
+
+def test_coherent_sets_and_access_to_several_readers(domain: int) -> None:
+    together = ddsi.Qos(presentation=ddsi.Presentation(ddsi.AccessScope.GROUP, coherent_access=True))
+    with blocking.DomainParticipant(domain) as participant:
+        publisher = blocking.Publisher(participant, together)
+        subscriber = blocking.Subscriber(participant, together)
+        topics = [blocking.Topic(participant, name, Shape) for name in ("Square", "Circle")]
+        writers = [blocking.DataWriter(publisher, topic, RELIABLE) for topic in topics]
+        readers = [blocking.DataReader(subscriber, topic, RELIABLE) for topic in topics]
+        for writer in writers:
+            writer.wait_for_matched(timeout=5)
+
+        def numbers() -> list[int]:
+            with subscriber.access():
+                return [sample.data.x for reader in readers for sample in reader.take()]
+
+        with publisher.coherent_changes():
+            for number, writer in enumerate(writers):
+                writer.write(Shape("BLUE", number))
+            assert numbers() == []
+        subscriber.wait(timeout=5)
+        with subscriber.access():
+            assert set(subscriber.get_datareaders()) == set(readers)
+        assert numbers() == [0, 1]
+        with pytest.raises(KeyError), publisher.coherent_changes():
+            writers[0].write(Shape("BLUE", 9))
+            raise KeyError
+        assert numbers() == []
+        publisher.suspend_publications()
+        publisher.resume_publications()
+        with pytest.raises(ddsi.PreconditionNotMet):
+            publisher.end_coherent_changes()
+        with pytest.raises(ddsi.DdsTimeout, match="no samples in"):
+            subscriber.wait(timeout=0.01)

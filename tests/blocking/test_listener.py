@@ -144,11 +144,41 @@ def test_a_listener_that_is_replaced_is_called_no_more(domain: int) -> None:
 def test_every_status_has_its_method() -> None:
     kinds = {
         kind
-        for entity in (blocking.DomainParticipant, blocking.Topic, blocking.DataWriter, blocking.DataReader)
+        for entity in (
+            blocking.DomainParticipant,
+            blocking.Topic,
+            blocking.Subscriber,
+            blocking.DataWriter,
+            blocking.DataReader,
+        )
         for kind in entity.STATUSES
     }
-    assert kinds <= set(_METHODS)
+    assert kinds == {*_METHODS, ddsi.DataAvailable, ddsi.DataOnReaders}, "data have methods with one argument"
     assert all(callable(getattr(blocking.Listener, name)) for name in _METHODS.values())
+
+
+def test_data_that_came_before_the_listener_and_data_on_a_subscribers_readers_are_told_too(domain: int) -> None:
+    told: queue.Queue[object] = queue.Queue()
+
+    class Telling(blocking.Listener):
+        def on_data_available(self, reader: Any) -> None:
+            told.put(reader)
+
+        def on_data_on_readers(self, subscriber: Any) -> None:
+            told.put(subscriber)
+
+    with blocking.DomainParticipant(domain) as participant:
+        topic = blocking.Topic(participant, "Square", Shape)
+        writer = blocking.DataWriter(participant, topic, RELIABLE)
+        subscriber = blocking.Subscriber(participant)
+        reader = blocking.DataReader(subscriber, topic, RELIABLE)
+        writer.write(Shape("BLUE", 1))
+        reader.set_listener(Telling())
+        assert told.get(timeout=5) is reader
+        reader.set_listener(None)
+        subscriber.set_listener(Telling())
+        writer.write(Shape("BLUE", 2))
+        assert told.get(timeout=5) is subscriber
 
 
 def test_something_else_is_no_listener(domain: int) -> None:
