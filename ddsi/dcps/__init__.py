@@ -7,6 +7,8 @@ from .data_reader import DataReader
 from .data_writer import DataWriter
 from .entity import Entity, EventStream
 from .groups import Publisher, Subscriber
+from .multi_topic import MultiTopic
+from .multi_topic_reader import MultiTopicReader
 from .participant import DomainParticipant
 from .sample import Sample
 from .topic import Topic
@@ -22,6 +24,8 @@ __all__ = [
     "Entity",
     "EventStream",
     "GuardCondition",
+    "MultiTopic",
+    "MultiTopicReader",
     "Publisher",
     "QueryCondition",
     "ReadCondition",

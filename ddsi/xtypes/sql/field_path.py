@@ -35,7 +35,7 @@ from ..model import (
 )
 from .syntax import Field, InvalidExpression
 
-__all__ = ["FieldPath", "ValueKind", "nearest"]
+__all__ = ["FieldPath", "ValueKind", "find_member", "nearest"]
 
 Step = Callable[[Any], Any]
 
@@ -77,6 +77,12 @@ class FieldPath:
         if kind is None:
             search.refuse(f"{field} is {_described(type_)}; {_remedy(field, type_)}")
         return cls(field, type_, kind, search.getter(), search.is_key, search.is_certain)
+
+
+def find_member(struct: StructType, field: Field, text: str = "") -> tuple[IdlType, Step]:
+    """The type of the member that ``field`` names, whatever it is, and how to get it.  Raises InvalidExpression."""
+    search = _Search(field, text)
+    return search.walk(struct), search.getter()
 
 
 class _Search:
