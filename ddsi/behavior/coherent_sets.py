@@ -91,8 +91,8 @@ class Outlet(Protocol):
         """A part is whole: ``end`` is what ended it, a mark or the first change behind it."""
         ...
 
-    def spoilt(self, part: Part, now: float) -> None:
-        """A part will not be whole."""
+    def spoilt(self, part: Part, end: CacheChange | None, now: float) -> None:
+        """A part was not whole when it ended; None: its writer is gone."""
         ...
 
     def nothing(self, end: CacheChange, now: float) -> bool:
@@ -123,7 +123,7 @@ class MakeVisible:
             self._sink.add(change, now)
         return True
 
-    def spoilt(self, part: Part, now: float) -> None:
+    def spoilt(self, part: Part, end: CacheChange | None, now: float) -> None:
         pass
 
     def nothing(self, end: CacheChange, now: float) -> bool:
@@ -197,7 +197,7 @@ class CoherentSets:
         part = self._parts.get(writer)
         if part is not None:
             part.spoil("its writer was gone before the end of its coherent set")
-            self._give_up(part, now)
+            self._give_up(part, None, now)
 
     # --- parts -------------------------------------------------------------------------------------------
 
@@ -246,7 +246,7 @@ class CoherentSets:
         next_sn = part.next_sn
         self._count_numbers(part, end)
         if part.flaw:
-            self._give_up(part, now)
+            self._give_up(part, end, now)
         elif not self._outlet.complete(part, end, now):
             part.next_sn = next_sn
             return False
@@ -257,8 +257,8 @@ class CoherentSets:
             self._filtered[end.writer_guid] = [kept for kept in ranges if kept[1] > end.sequence_number]
         return True
 
-    def _give_up(self, part: Part, now: float) -> None:
-        self._outlet.spoilt(part, now)
+    def _give_up(self, part: Part, end: CacheChange | None, now: float) -> None:
+        self._outlet.spoilt(part, end, now)
         self._forget(part)
         self._on_lost(part.first.writer_guid, part.first.sequence_number, part.lost_count, part.flaw)
 

@@ -65,6 +65,14 @@ class _Pair:
             self.group_sn = max(self.group_sn, self.told[1])
         return self.group_sn
 
+    def has_lost_before(self, number: int) -> bool:
+        """Are numbers missing between the last one and this?
+
+        Those of the time before the match do not count.  A writer keeps no more of its history than it has to: where
+        all of its part in a set was replaced since, the set is what is left of it.
+        """
+        return not self.proxy.is_local and number > max(self.delivered_sn, self.proxy.historical_sn) + 1
+
     @property
     def is_behind(self) -> bool:
         """Is something known to be under way?"""
@@ -244,12 +252,14 @@ class SubscriberGroup:
         unit = _Unit(group_sn or publisher.highest(), now, is_set=False)
         self.octets += unit.put(member, changes)
         publisher.push(unit)
-        self._note(publisher, member, last)
+        self._note(publisher, member, last, since=changes[0], before_sn=unit.group_sn)
         self._release_of(publisher, now)
         return True
 
     def begun(self, member: _Member, part: Part, now: float) -> None:
-        unit = self._unit_of(self._find(member, part.first.writer_guid), part.group_set_sn, now)
+        publisher = self._find(member, part.first.writer_guid)
+        self._note(publisher, member, part.first, since=part.first, before_sn=part.group_set_sn)
+        unit = self._unit_of(publisher, part.group_set_sn, now)
         if unit is not None:
             unit.begun[(member.reader, part.first.writer_guid)] = None
 
@@ -267,11 +277,16 @@ class SubscriberGroup:
         self._release_of(publisher, now)
         return True
 
-    def spoilt(self, member: _Member, part: Part, now: float) -> None:
+    def spoilt(self, member: _Member, part: Part, end: CacheChange | None, now: float) -> None:
         publisher = self._find(member, part.first.writer_guid)
         unit = publisher.sets.get(part.group_set_sn)
         if unit is not None:
             self._give_up(publisher, unit, f"another part of the coherent set is not whole: {part.flaw}")
+        pair = publisher.pairs.get((member.reader, part.first.writer_guid))
+        if pair is not None and end is not None:
+            pair.delivered_sn = end.sequence_number - 1
+            if end.is_end_of_set:
+                self._note(publisher, member, end, since=end, before_sn=0)
         self._release_of(publisher, now)
 
     def nothing(self, member: _Member, end: CacheChange, now: float) -> bool:
@@ -281,10 +296,11 @@ class SubscriberGroup:
         publisher = self._find(member, end.writer_guid)
         if member.policy.coherent_access:
             unit = self._unit_of(publisher, coherence.group_set_sn, now)
+            self._note(publisher, member, end, since=end, before_sn=coherence.group_set_sn + 1)
             self._ended(publisher, unit, member, end, end)
         else:  # all that it means here is its place in the order
             publisher.push(_Unit(coherence.group_sn or publisher.highest(), now, is_set=False))
-            self._note(publisher, member, end)
+            self._note(publisher, member, end, since=end, before_sn=coherence.group_sn)
         self._release_of(publisher, now)
         return True
 
@@ -310,19 +326,29 @@ class SubscriberGroup:
         self, publisher: _Publisher, unit: _Unit | None, member: _Member, last: CacheChange, end: CacheChange
     ) -> None:
         """A writer has ended its part, of which ``last`` was the last change; ``end`` told so."""
-        self._note(publisher, member, last)
+        self._note(publisher, member, last, since=last, before_sn=0)
         if end.is_end_of_set:
-            self._note(publisher, member, end)
+            self._note(publisher, member, end, since=end, before_sn=0)
         if unit is not None:
             unit.ended[(member.reader, last.writer_guid)] = None
             end_sn = end.coherence.group_sn if end.coherence is not None else 0
             unit.end_sn = max(unit.end_sn, end_sn - (not end.is_end_of_set))
 
-    def _note(self, publisher: _Publisher, member: _Member, change: CacheChange) -> None:
-        pair = publisher.pairs.get((member.reader, change.writer_guid))
-        if pair is not None:
-            pair.delivered_sn = change.sequence_number
-            pair.group_sn = max(pair.group_sn, change.coherence.group_sn if change.coherence is not None else 0)
+    def _note(
+        self, publisher: _Publisher, member: _Member, change: CacheChange, *, since: CacheChange, before_sn: int
+    ) -> None:
+        """A writer has come so far.  Had it more to say before ``since``, then sets that began before that group number
+        may lack what it wrote in them."""
+        key = (member.reader, change.writer_guid)
+        pair = publisher.pairs.get(key)
+        if pair is None:
+            return
+        if pair.has_lost_before(since.sequence_number):
+            for unit in list(publisher.sets.values()):
+                if unit.group_sn < before_sn and key not in unit.ended:
+                    self._give_up(publisher, unit, "numbers are missing that may have belonged to its coherent set")
+        pair.delivered_sn = max(pair.delivered_sn, change.sequence_number)
+        pair.group_sn = max(pair.group_sn, change.coherence.group_sn if change.coherence is not None else 0)
 
     def _has_to_wait(self, member: _Member, publisher: _Publisher) -> bool:
         """The application holds everything up, and enough waits for it here."""
@@ -452,9 +478,9 @@ class _Member:
             return self._group.take_in(self, part.changes, now)
         return self._group.complete(self, part, end, now)
 
-    def spoilt(self, part: Part, now: float) -> None:
+    def spoilt(self, part: Part, end: CacheChange | None, now: float) -> None:
         if part.group_set_sn:
-            self._group.spoilt(self, part, now)
+            self._group.spoilt(self, part, end, now)
 
     def nothing(self, end: CacheChange, now: float) -> bool:
         return self._group.nothing(self, end, now)

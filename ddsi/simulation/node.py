@@ -34,6 +34,7 @@ from ..trace.events import Remark
 from ..trace.sink import TraceSink
 from .dice import Dice
 from .endpoints import SIMULATED_KEYS, BookKeeper, NodeReader, NodeWriter
+from .groups import NodePublisher, NodeSubscriber
 from .network import Network, Port
 from .vendor_hooks import VendorHooks
 from .vendors import Vendor
@@ -193,11 +194,13 @@ class Node:
         filters: bool = False,
         type_name: str = "T",
         compile_filter: CompileFilter | None = None,
+        publisher: NodePublisher | None = None,
     ) -> NodeWriter:
         """``filters``: each change has a destination.  ``compile_filter``: it evaluates readers' content filters."""
         local = self.engine.create_writer(
-            topic, type_name, writer_qos(qos), self.now, is_keyed=keyed, filters=filters, compile_filter=compile_filter
-        )
+            topic, type_name, writer_qos(qos), self.now, is_keyed=keyed, filters=filters, compile_filter=compile_filter,
+            group=publisher.group if publisher is not None else None,
+        )  # fmt: skip
         writer = NodeWriter(self, local)
         self.writers.append(writer)
         self.pump()
@@ -213,16 +216,24 @@ class Node:
         uses_filter: bool = False,
         type_name: str = "T",
         content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
+        subscriber: NodeSubscriber | None = None,
     ) -> NodeReader:
         keys = SIMULATED_KEYS if keyed else None
+        group = subscriber.group if subscriber is not None else None
         local = self.engine.create_reader(
             topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys, uses_filter=uses_filter,
-            content_filter=content_filter,
+            content_filter=content_filter, group=group,
         )  # fmt: skip
         reader = NodeReader(self, local, self._books.books[local.guid], takes=takes)
         self.readers.append(reader)
         self.pump()
         return reader
+
+    def publisher(self) -> NodePublisher:
+        return NodePublisher(self)
+
+    def subscriber(self) -> NodeSubscriber:
+        return NodeSubscriber(self)
 
     def live_writers(self) -> list[NodeWriter]:
         return [writer for writer in self.writers if not writer.is_deleted]
