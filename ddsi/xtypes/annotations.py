@@ -22,6 +22,7 @@ __all__ = [
     "MemberId",
     "MemberName",
     "TypedefName",
+    "Unit",
     "autoid_hash",
 ]
 
@@ -117,6 +118,17 @@ class TypedefName:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise BadParameter(f"idl.typedef takes the alias's name in IDL, not {self.name!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """``idl.unit("m/s")``: what a number counts, for people and other programs."""
+
+    name: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise BadParameter(f"idl.unit takes a text, not {self.name!r}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,13 @@ import math
 import struct
 import sys
 from array import array
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 __all__ = [
     "array_numbers",
     "array_octets",
+    "beyond",
     "booleans",
     "booleans_from",
     "chars",
@@ -208,6 +209,12 @@ def array_numbers(value: Any, dimensions: tuple[int, ...], code: str, size: int,
     packed, count = numbers(flatten(value, dimensions), code, size, order, swap=swap)
     _check_count(count, dimensions)
     return packed
+
+
+def beyond(allow: Callable[[Any], bool], value: Any, dimensions: tuple[int, ...]) -> bool:
+    """Whether one of the numbers, in rows of rows if there are several dimensions, is not allowed."""
+    flat = flatten(value, dimensions) if dimensions else value
+    return not all(map(allow, flat.tolist() if hasattr(flat, "tolist") else flat))
 
 
 def _check_count(count: int, dimensions: tuple[int, ...]) -> None:

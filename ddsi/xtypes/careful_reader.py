@@ -18,6 +18,7 @@ from typing import Any, NoReturn
 
 from ..structure.errors import MalformedSample
 from .bitsets import bitset_from
+from .bounds import trimmed, unbounded
 from .buffers import wchars_from
 from .defaults import default_cost, default_value, elements_value, zero_cost
 from .enumerations import bitmask_from
@@ -39,6 +40,7 @@ from .model import (
     SequenceType,
     String,
     StructType,
+    TryConstruct,
     UnionType,
 )
 
@@ -74,6 +76,8 @@ class _CarefulReader:
         self._origin = 4
         self._end = len(payload)
         self._depth = 0
+        self._forgiving = 0
+        self._is_unfit = False
         self._defaulted = 0
         self._most_defaulted = _MOST_DEFAULTED + min(zero_cost(type_), 64 * _MOST_DEFAULTED)
         if self._end < 4:
@@ -106,6 +110,12 @@ class _CarefulReader:
         where = f"{path}: " if path else ""
         message = f"{self._type.type_name}: {where}{reason} (octet {self._position})"
         raise MalformedSample(message, path=path, offset=self._position)
+
+    def _unfit(self, reason: str) -> None:
+        """What was read is no value of its type, but its octets are in order: a member around may have its default."""
+        if not self._forgiving:
+            self.fail(reason)
+        self._is_unfit = True
 
     # --- octets ------------------------------------------------------------------------------------------
 
@@ -182,7 +192,8 @@ class _CarefulReader:
     def _literal(self, type_: EnumType, raw: int) -> Any:
         literal = type_.python_class._value2member_map_.get(raw)
         if literal is None:
-            self.fail(f"{raw} is no literal of {type_.type_name}")
+            self._unfit(f"{raw} is no literal of {type_.type_name}")
+            return type_.default
         return literal
 
     def _string(self, type_: String) -> str:
@@ -193,7 +204,7 @@ class _CarefulReader:
         if octets[-1]:
             self.fail("a string without its terminating NUL")
         if type_.bound is not None and length - 1 > type_.bound:
-            self.fail(f"a string of {length - 1} octets exceeds its bound of {type_.bound}")
+            self._unfit(f"a string of {length - 1} octets exceeds its bound of {type_.bound}")
         try:
             return octets[:-1].decode()
         except UnicodeDecodeError as error:
@@ -205,7 +216,7 @@ class _CarefulReader:
         if length & 1:
             self.fail(f"a wide string of {length} octets, which is no number of units of two")
         if type_.bound is not None and length > 2 * type_.bound:
-            self.fail(f"a wide string of {length // 2} characters exceeds its bound of {type_.bound}")
+            self._unfit(f"a wide string of {length // 2} characters exceeds its bound of {type_.bound}")
         return wchars_from(self._take(length), little_endian=self._encoding.little_endian)
 
     def _map(self, type_: MapType) -> dict[Any, Any]:
@@ -220,7 +231,7 @@ class _CarefulReader:
     def _entries(self, type_: MapType) -> dict[Any, Any]:
         count = self._uint32()
         if type_.bound is not None and count > type_.bound:
-            self.fail(f"{count} entries exceed the bound of {type_.bound}")
+            self._unfit(f"{count} entries exceed the bound of {type_.bound}")
         if 2 * count > self._end - self._position:  # a key and a value have an octet each at least
             self.fail(f"{count} entries of {type_} where {max(0, self._end - self._position)} octets are left")
         entries: dict[Any, Any] = {}
@@ -247,7 +258,7 @@ class _CarefulReader:
         else:
             count = self._uint32()
             if type_.bound is not None and count > type_.bound:
-                self.fail(f"{count} elements exceed the bound of {type_.bound}")
+                self._unfit(f"{count} elements exceed the bound of {type_.bound}")
         element = type_.element
         smallest = element.size if isinstance(element, Primitive) else 1
         if count * smallest > self._end - self._position:
@@ -327,7 +338,7 @@ class _CarefulReader:
             if type_.extensibility is Extensibility.MUTABLE:
                 self.fail(f"a union without the member {case.name}, which its discriminator selects")
             with self._at(f".{case.name}"):
-                values[case.name] = self._value(case.type)
+                values[case.name] = self._member(case)
         union = object.__new__(type_.python_class)
         union._idl_discriminator = values[name]
         union._idl_value = None if case is None else values[case.name]
@@ -363,18 +374,33 @@ class _CarefulReader:
             self.fail(f"too much is left out: {member.name} and others would need {self._defaulted} default values")
         return default_value(member)
 
+    def _member(self, member: Member, *, growable: bool = False) -> Any:
+        """The member's value; what it cannot hold is trimmed or becomes its default, if it says so."""
+        match member.try_construct:
+            case TryConstruct.DISCARD:
+                return self._value(member.type, growable=growable)
+            case TryConstruct.TRIM:
+                return trimmed(member.type, self._value(unbounded(member.type), growable=growable))
+            case TryConstruct.USE_DEFAULT:
+                was_unfit, self._is_unfit = self._is_unfit, False
+                self._forgiving += 1
+                value = self._value(member.type, growable=growable)
+                self._forgiving -= 1
+                is_unfit, self._is_unfit = self._is_unfit, was_unfit
+                return self._default(member) if is_unfit else value
+
     def _plain_member(self, member: Member) -> Any:
         if not member.is_optional:
-            return self._value(member.type)
+            return self._member(member)
         if self._encoding.is_xcdr2:
-            return self._value(member.type) if self._primitive(BOOLEAN, self._number("B", 1)) else None
+            return self._member(member) if self._primitive(BOOLEAN, self._number("B", 1)) else None
         identifier, _, length = self._parameter_header()
         if identifier != member.id:
             self.fail(f"the header of member id {identifier} where {member.id} is due")
         if length == 0:
             return None
         with self._delimited(length, new_origin=True):
-            return self._value(member.type, growable=True)
+            return self._member(member, growable=True)
 
     # --- mutable types -----------------------------------------------------------------------------------
 
@@ -436,7 +462,7 @@ class _CarefulReader:
         if member.name in values:
             self.fail(f"member {member.name} is there twice")
         with self._at(f".{member.name}"):
-            values[member.name] = self._value(member.type, growable=True)
+            values[member.name] = self._member(member, growable=True)
             growable = isinstance(member.type, StructType) and not self._encoding.is_xcdr2
             if self._end - self._position > 3 and not growable:
                 self.fail(f"{self._end - self._position} octets too many")

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..structure.errors import BadParameter
+from ..structure.qos_policies import DataRepresentationId
 from .annotations import HashId, MemberId, autoid_hash
 from .equality import same_members
 from .model import Extensibility, Member, StructType
@@ -41,6 +42,7 @@ def define_struct(
     autoid: str,
     is_nested: bool,
     frame: Scope,
+    representations: tuple[DataRepresentationId, ...] = (),
 ) -> type[Any]:
     """The decorated class; see :func:`ddsi.idl.struct`."""
     if not isinstance(python_class, type):
@@ -63,11 +65,19 @@ def define_struct(
         base=base,
         is_nested=is_nested,
         has_hashed_ids=hashed,
+        representations=_checked_representations(name, representations),
     )
     setattr(decorated, STRUCT_ATTRIBUTE, struct)
     with contextlib.suppress(NameError):  # a name not defined yet: found, or refused, at first use
         refuse_impossible(struct)
     return decorated
+
+
+def _checked_representations(name: str, representations: Any) -> tuple[DataRepresentationId, ...]:
+    possible = (DataRepresentationId.XCDR1, DataRepresentationId.XCDR2)
+    if not isinstance(representations, tuple) or not all(chosen in possible for chosen in representations):
+        raise BadParameter(f"{name}: representations are a tuple of idl.XCDR1 and idl.XCDR2, not {representations!r}")
+    return representations
 
 
 def _base_of(python_class: type[Any]) -> StructType | None:
@@ -148,6 +158,9 @@ class _MemberSearch:
             is_serialized="non_serialized" not in resolved.flags,
             typedefs=resolved.typedefs,
             hash_name=resolved.hash_name,
+            try_construct=resolved.try_construct,
+            limits=resolved.limits,
+            unit=resolved.unit,
         )
         self._check(member, before)
         return member

@@ -22,13 +22,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
 
 from ..structure.errors import BadParameter
+from ..structure.qos_policies import DataRepresentationId
 from . import model
-from .annotations import Array, Bits, Bound, CaseLabels, ElementOf, Flag, HashId, MemberId, MemberName, TypedefName
+from .annotations import (
+    Array,
+    Bits,
+    Bound,
+    CaseLabels,
+    ElementOf,
+    Flag,
+    HashId,
+    MemberId,
+    MemberName,
+    TypedefName,
+    Unit,
+)
 from .bitsets import define_bitset
 from .definition import define_struct
 from .enumerations import describe_bitmask, describe_enum
 from .idl_compiler import IdlError, IdlWarning
-from .model import Extensibility
+from .model import Extensibility, Limits, TryConstruct
 from .resolution import named_type
 from .unions import define_union, selected_member
 
@@ -39,6 +52,8 @@ __all__ = [
     "APPENDABLE",
     "FINAL",
     "MUTABLE",
+    "XCDR1",
+    "XCDR2",
     "Extensibility",
     "IdlError",
     "IdlWarning",
@@ -70,18 +85,21 @@ __all__ = [
     "non_serialized",
     "octet",
     "optional",
+    "range",
     "selected_member",
     "sequence",
     "sequence_of",
     "struct",
     "switch",
     "to_idl",
+    "try_construct",
     "typedef",
     "uint8",
     "uint16",
     "uint32",
     "uint64",
     "union",
+    "unit",
     "wchar",
     "wstring",
 ]
@@ -95,6 +113,9 @@ _F = TypeVar("_F", bound=IntFlag)
 FINAL = Extensibility.FINAL
 APPENDABLE = Extensibility.APPENDABLE
 MUTABLE = Extensibility.MUTABLE
+
+XCDR1 = DataRepresentationId.XCDR1
+XCDR2 = DataRepresentationId.XCDR2
 
 boolean: TypeAlias = Annotated[bool, model.BOOLEAN]
 octet: TypeAlias = Annotated[int, model.OCTET]
@@ -160,6 +181,38 @@ def id(number: int) -> MemberId:
     return MemberId(number)
 
 
+def range(min: float | None = None, max: float | None = None) -> Limits:
+    """The lowest and the highest value of a number, or of each element (IDL ``@range``, ``@min``, ``@max``).
+
+    What is beyond them is refused when it is written.  What others send is not judged by them.
+    """
+    for limit in (min, max):
+        if isinstance(limit, bool) or not isinstance(limit, int | float | None) or (limit or 0.0) - (limit or 0.0) != 0:
+            raise BadParameter(f"idl.range takes finite numbers, not {limit!r}")
+    if min is None and max is None:
+        raise BadParameter("idl.range takes the lowest value, the highest, or both, as in idl.range(0, 10)")
+    if min is not None and max is not None and min > max:
+        raise BadParameter(f"idl.range({min}, {max}): nothing lies between them")
+    return Limits(min, max)
+
+
+def unit(name: str) -> Unit:
+    """What a number counts (IDL ``@unit``): it is told to others with the complete type, and changes nothing here."""
+    return Unit(name)
+
+
+def try_construct(behavior: Literal["discard", "use_default", "trim"]) -> TryConstruct:
+    """What becomes of a received value that does not fit: too long for its bound, or no literal of its enum.
+
+    ``discard``, the default: the sample is malformed.  ``use_default``: the member has its default.  ``trim``: a
+    string, sequence or map is cut to its bound.  (IDL ``@try_construct``, DDS-XTypes 1.3 §7.2.4.3.)
+    """
+    try:
+        return TryConstruct(behavior)
+    except ValueError:
+        raise BadParameter(f'idl.try_construct takes "discard", "use_default" or "trim", not {behavior!r}') from None
+
+
 def name(idl_name: str) -> MemberName:
     """The member's name in IDL, where Python keeps the word for itself: ``from_: Annotated[str, idl.name("from")]``."""
     return MemberName(idl_name)
@@ -218,6 +271,7 @@ def struct(
     extensibility: Extensibility = Extensibility.APPENDABLE,
     autoid: Literal["sequential", "hash"] = "sequential",
     nested: bool = False,
+    representations: tuple[DataRepresentationId, ...] = (),
 ) -> Callable[[type[_C]], type[_C]]: ...
 @dataclass_transform(field_specifiers=(field, Field))
 def struct(
@@ -228,13 +282,15 @@ def struct(
     extensibility: Extensibility = Extensibility.APPENDABLE,
     autoid: Literal["sequential", "hash"] = "sequential",
     nested: bool = False,
+    representations: tuple[DataRepresentationId, ...] = (),
 ) -> Any:
     """Make a class an IDL struct: a dataclass with slots whose annotations say the IDL types.
 
     ``typename`` is the name on the wire (``module::Name``; default: the class's name); ``extensibility`` is
     ``idl.FINAL``, ``idl.APPENDABLE`` (the default, as in IDL 4.2) or ``idl.MUTABLE``; ``autoid`` tells how members
     without ``idl.id`` get their ids; ``nested`` says that it is no topic type itself (IDL ``@nested``; other programs
-    are told, nothing else changes).  A base class that is a struct is the IDL base.
+    are told, nothing else changes); ``representations`` are those that topics may use, the preferred one first, as in
+    ``(idl.XCDR2,)`` (IDL ``@data_representation``; default: both).  A base class that is a struct is the IDL base.
 
     Raises BadParameter, naming member and reason, for a class that cannot be a type; where an annotation names
     what is not yet defined, at first use.
@@ -249,6 +305,7 @@ def struct(
             autoid=autoid,
             is_nested=nested,
             frame=frame,
+            representations=representations,
         )
 
     return decorate if python_class is None else decorate(python_class)

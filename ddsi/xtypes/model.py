@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar
 
 from ..structure.dataclass import dataclass
+from ..structure.qos_policies import DataRepresentationId
 
 __all__ = [
     "BOOLEAN",
@@ -333,6 +334,8 @@ class Case(Member):
 class StructType:
     """A struct: the identity of a topic type, of a nested type, or of a projection of one (see ``keys.py``).
 
+    ``representations``: those that topics of this type may use, the preferred one first; empty where it does not say.
+
     ``members`` holds the base's members first.  ``omitted`` are the members of the Python class which this type does
     not have on the wire: those not serialized, and in projections those left out.
     """
@@ -347,6 +350,7 @@ class StructType:
         "is_nested",
         "omitted",
         "python_class",
+        "representations",
         "static_sizes",
         "type_name",
         "zero_cost",
@@ -366,12 +370,14 @@ class StructType:
         omitted: tuple[Member, ...] = (),
         is_nested: bool = False,
         has_hashed_ids: bool = False,
+        representations: tuple[DataRepresentationId, ...] = (),
     ) -> None:
         self.python_class = python_class
         self.type_name = type_name
         self.extensibility = extensibility
         self.is_nested = is_nested
         self.has_hashed_ids = has_hashed_ids
+        self.representations = representations
         self.base = base
         self.omitted = omitted
         self._resolve = resolve

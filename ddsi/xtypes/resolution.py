@@ -19,7 +19,7 @@ from typing import Annotated, Any, Protocol
 from ..structure.dataclass import dataclass
 from ..structure.errors import BadParameter
 from . import model
-from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName, TypedefName
+from .annotations import Array, Bits, Bound, ElementOf, Flag, HashId, MemberId, MemberName, TypedefName, Unit
 from .enumerations import bitmask_type, enum_type
 from .model import (
     ArrayType,
@@ -27,11 +27,13 @@ from .model import (
     BitsetType,
     EnumType,
     IdlType,
+    Limits,
     MapType,
     Primitive,
     SequenceType,
     String,
     StructType,
+    TryConstruct,
     Typedefs,
     UnionType,
 )
@@ -71,6 +73,9 @@ class Resolved:
     idl_name: str = ""
     bits: Bits | None = None
     typedefs: Typedefs | None = None
+    try_construct: TryConstruct = TryConstruct.DISCARD
+    limits: Limits | None = None
+    unit: str | None = None
 
     @property
     def hash_name(self) -> str | None:
@@ -161,6 +166,13 @@ class Resolver:
                 resolved.typedefs = Typedefs((*inner.names, name), inner.parts, inner.rows)
             case Bits():
                 resolved.bits = marker
+            case Unit(name=name):
+                resolved.unit = name
+            case TryConstruct():
+                resolved.try_construct = marker
+            case Limits():
+                _refuse_limits_of(resolved.type)
+                resolved.limits = marker
             case types.FunctionType() if marker.__module__.endswith(".xtypes.idl"):
                 raise BadParameter(f"idl.{marker.__name__} needs its argument, as in idl.{marker.__name__}(8)")
             case _:
@@ -194,7 +206,16 @@ class Resolver:
 
     def _element(self, element: Any, collection: str) -> Resolved:
         resolved = self.resolve(element)
-        unfit = resolved.flags | ({"id"} if resolved.member_id is not None else set())
+        unfit = resolved.flags | {
+            word
+            for word, is_said in (
+                ("id", resolved.member_id is not None),
+                ("range", resolved.limits is not None),
+                ("try_construct", resolved.try_construct is not TryConstruct.DISCARD),
+                ("unit", resolved.unit is not None),
+            )
+            if is_said
+        }
         if unfit:
             raise BadParameter(f"idl.{min(unfit)} belongs to the member, not to the elements of its {collection}")
         return resolved
@@ -213,6 +234,12 @@ def named_type(python_class: Any) -> EnumType | BitmaskType | BitsetType | Struc
     if not isinstance(found, (EnumType, BitmaskType, BitsetType, StructType, UnionType)):
         raise BadParameter(f"{python_class!r} is no IDL type; it is a class decorated with @idl.struct or its siblings")
     return found
+
+
+def _refuse_limits_of(type_: IdlType) -> None:
+    element = type_.element if isinstance(type_, (SequenceType, ArrayType)) else type_
+    if not isinstance(element, Primitive) or not element.is_number:
+        raise BadParameter(f"idl.range fits numbers, and sequences and arrays of them, not {type_}")
 
 
 def _bounded(type_: IdlType, limit: int) -> IdlType:
@@ -273,7 +300,9 @@ def _why_not(annotation: Any, origin: Any) -> str:
         return f"{shown} does not say of what; use idl.sequence[...]"
     if tuple in (annotation, origin):
         return "a tuple is no IDL type; use idl.sequence[...], with idl.array(n) for a fixed number of elements"
-    if isinstance(annotation, Flag | Bound | Array | MemberId | HashId | MemberName | TypedefName | Bits):
+    if isinstance(
+        annotation, Flag | Bound | Array | MemberId | HashId | MemberName | TypedefName | Bits | Unit | Limits
+    ):
         return f"{annotation!r} stands inside Annotated[type, ...], behind a type"
     if isinstance(annotation, type) and issubclass(annotation, enum.Enum):
         return f"{shown} is an Enum; IDL enums are enum.IntEnum, bitmasks enum.IntFlag"

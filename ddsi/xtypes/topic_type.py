@@ -113,8 +113,11 @@ def default_representations(struct: StructType) -> tuple[DataRepresentationId, .
     """What the type can be sent in; a writer's default first.
 
     XCDR1 reaches every vendor, but cannot delimit an appendable type inside another, and its forms of optional and
-    mutable differ between vendors: there XCDR2 comes first.
+    mutable differ between vendors: there XCDR2 comes first.  What the type says itself (IDL ``@data_representation``)
+    has the last word.
     """
+    if struct.representations:
+        return struct.representations
     structs = list(reachable_structs(struct))
     prefers_xcdr2 = is_recursive(struct) or any(
         inner.extensibility is Extensibility.MUTABLE

@@ -160,6 +160,9 @@ class _CaseSearch:
             is_external="external" in resolved.flags,
             typedefs=resolved.typedefs,
             hash_name=resolved.hash_name,
+            try_construct=resolved.try_construct,
+            limits=resolved.limits,
+            unit=resolved.unit,
             labels=tuple(self._label(name, switch.type, label) for label in labels.labels),
             is_default=labels.is_default,
         )

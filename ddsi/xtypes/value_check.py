@@ -22,6 +22,7 @@ from .model import (
     BitsetType,
     EnumType,
     IdlType,
+    Limits,
     MapType,
     Member,
     Primitive,
@@ -48,6 +49,8 @@ def check_value(member: Member, value: Any, path: str, *, depth: int = 0) -> Non
         return
     try:
         _check(member.type, value, path, depth)
+        if member.limits is not None:
+            _check_limits(member.type, member.limits, value, path)
     except (BadParameter, NameError):
         raise
     except Exception as error:  # from a method of the value's own, or numpy's word on the truth of an array
@@ -76,6 +79,17 @@ def _check(type_: IdlType, value: Any, path: str, depth: int) -> None:
             _check_array(type_, value, path, depth)
         case StructType():
             _check_struct(type_, value, path, depth)
+
+
+def _check_limits(type_: IdlType, limits: Limits, value: Any, path: str) -> None:
+    items = [("", value)]
+    if isinstance(type_, (SequenceType, ArrayType)):
+        flat = flatten(value, type_.dimensions) if isinstance(type_, ArrayType) else value
+        flat = flat.tolist() if hasattr(flat, "tolist") else flat
+        items = [(type_.place(index), item) for index, item in enumerate(flat)]
+    for place, item in items:
+        if not limits.allow(item):
+            raise BadParameter(f"{path}{place}: {_shown(item)} is beyond its range ({limits})")
 
 
 def _check_primitive(type_: Primitive, value: Any, path: str) -> None:
@@ -159,7 +173,7 @@ def _check_union(type_: UnionType, value: Any, path: str, depth: int) -> None:
     _check(type_.discriminator.type, value._idl_discriminator, f"{path}.{type_.discriminator.name}", depth)
     case = type_.case_of(value._idl_discriminator)
     if case is not None:
-        _check(case.type, value._idl_value, f"{path}.{case.name}", depth + 1)
+        check_value(case, value._idl_value, f"{path}.{case.name}", depth=depth + 1)
 
 
 def _check_enum(type_: EnumType, value: Any, path: str) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from . import buffers
 from .layout import ALIGNED, UNKNOWN, Encoding, emheader_length_code, static_size
-from .model import Composite, Extensibility, Member, StructType, UnionType
+from .model import ArrayType, Composite, Extensibility, Member, SequenceType, StructType, UnionType
 from .recursion import FunctionPlan
 from .source import Source
 from .write_emitter import Position, WriteEmitter
@@ -52,7 +52,7 @@ def generate_writer(
 
 
 _RUNTIME = (
-    *("array_numbers", "array_octets", "booleans", "chars", "flatten", "numbers", "octets", "wchars"),
+    *("array_numbers", "array_octets", "beyond", "booleans", "chars", "flatten", "numbers", "octets", "wchars"),
     "sequence",
 )
 
@@ -134,12 +134,25 @@ class _TypeWriter(ValueWriter):
             if member.is_optional:
                 self._optional(member, self._local("x", expression), mutable=mutable)
             elif mutable:
-                self._parameter(member, expression)
+                self._parameter(member, self._within_limits(member, expression))
             else:
-                self.value(member.type, expression)
+                self.value(member.type, self._within_limits(member, expression))
         if mutable:
             self._end_parameters()
         self._close_dheader(delimiter)
+
+    def _within_limits(self, member: Member, expression: str) -> str:
+        """The expression, or where the member has an ``idl.range`` a variable that was seen to lie within."""
+        if member.limits is None:
+            return expression
+        value = self._local("x", expression)
+        allow = self._source.constant("allow", member.limits.allow)
+        if isinstance(member.type, (SequenceType, ArrayType)):
+            dimensions = member.type.dimensions if isinstance(member.type, ArrayType) else ()
+            self._refuse(f"beyond({allow}, {value}, {dimensions})")
+        else:
+            self._refuse(f"not {allow}({value})")
+        return value
 
     def _end_parameters(self) -> None:
         if not self._encoding.is_xcdr2:
@@ -162,7 +175,7 @@ class _TypeWriter(ValueWriter):
         with self._emitter.branches() as alternatives:
             for number, case in enumerate(type_.cases):
                 with alternatives.branch(f"{'elif' if number else 'if'} {index} == {number}:"):
-                    write_member(case, f"{value}._idl_value")
+                    write_member(case, self._within_limits(case, f"{value}._idl_value"))
             with alternatives.branch("else:" if type_.cases else f"if {index} < 0:"):
                 pass
         if mutable:
@@ -173,6 +186,7 @@ class _TypeWriter(ValueWriter):
         emitter = self._emitter
         with emitter.branches() as alternatives:
             with alternatives.branch(f"if {value} is not None:"):
+                value = self._within_limits(member, value)
                 if mutable or not self._encoding.is_xcdr2:
                     self._parameter(member, value, padded=mutable)
                 else:

@@ -26,6 +26,9 @@ PRIMITIVES = [
     *("unsigned long long", "float", "double", "string", "string<7>", "string<400>"),
 ]
 
+LIMITS = {"short": -5, "unsigned long": 4000000, "long long": 70000000000, "unsigned long long": 7, "double": 0.5}
+"""Some numbers, and what they may be at most."""
+
 LABELS = {"boolean": ["TRUE", "FALSE"], "char": ["'a'", "'b'", "'c'"], "long": ["-1", "2", "30"]}
 
 
@@ -91,7 +94,13 @@ class RandomIdl:
             )
             if extensibility == "mutable":
                 flags += choice(["", " @must_understand"])
-            members.append(f"{flags} {self._type()} s{number}m{index}{choice(['', '', '[4]', '[2][2]'])};")
+            flags += choice(["", "", ' @unit("m/s")', " @try_construct(USE_DEFAULT)"])
+            type_, dimensions = self._type(), choice(["", "", "[4]", "[2][2]"])
+            if type_.startswith("string<") and not dimensions and "try_construct" not in flags:
+                flags += " @try_construct(TRIM)"
+            if type_ in LIMITS and not self._keys:  # with keys samples are made, and not made to fit
+                flags += choice(["", " @range(min=0, max=100)", f" @max({LIMITS[type_]})"])
+            members.append(f"{flags} {type_} s{number}m{index}{dimensions};")
         annotations = f"@{extensibility}{choice(['', ' @autoid(HASH)'])}{choice(['', ' @nested'])}"
         bases.append(f"S{number}")
         self._names.append(f"S{number}")

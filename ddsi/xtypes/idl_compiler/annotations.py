@@ -6,14 +6,16 @@ for becomes a warning, as does an annotation that nobody knows.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
+from ...structure.qos_policies import DataRepresentationId
 from ..annotations import LARGEST_MEMBER_ID
-from ..model import Extensibility
+from ..model import Extensibility, Limits, TryConstruct
 from .constants import Lookup, evaluate
 from .declarations import ConstantValue
 from .source_text import IdlError, IdlWarning
-from .syntax import Annotation, Expression, Literal, Name
+from .syntax import Annotation, Binary, Expression, Literal, Name
 
 __all__ = ["BUILTIN", "Annotations"]
 
@@ -41,16 +43,10 @@ _WITHOUT_EFFECT = frozenset(
 )
 """Known, and rightly without effect where nobody asks for them: they concern people, or other programs."""
 
-_NOT_ACTED_UPON = {
-    "try_construct": "a sample that does not fit is always discarded",
-    "data_representation": "the QoS chooses the representation",
-}
-
-
 BUILTIN = frozenset(
     {
         *("key", "Key", "id", "hashid", "optional", "external", "must_understand", "non_serialized", "default"),
-        *("value", "default_literal", "position", *_WITHOUT_EFFECT, *_NOT_ACTED_UPON),
+        *("value", "default_literal", "position", "try_construct", "data_representation", *_WITHOUT_EFFECT),
     }
 )
 """Every annotation that has a meaning of its own here."""
@@ -74,11 +70,7 @@ class Annotations:
     def warn_of_the_rest(self) -> None:
         """Say which annotations have no effect.  To be called when all questions have been asked."""
         for name, annotation in self._unasked.items():
-            if name in _NOT_ACTED_UPON:
-                self._warnings.append(
-                    IdlWarning(annotation.place, f"@{name} is not acted upon: {_NOT_ACTED_UPON[name]}")
-                )
-            elif name not in _WITHOUT_EFFECT:
+            if name not in _WITHOUT_EFFECT:
                 self._warnings.append(IdlWarning(annotation.place, f"@{name} has no effect here, and is ignored"))
 
     # --- questions ---------------------------------------------------------------------------------------
@@ -142,6 +134,49 @@ class Annotations:
             return True
         word = self._word("autoid", ["SEQUENTIAL", "HASH"])
         return default if word is None else word == "HASH"
+
+    def try_construct(self) -> TryConstruct:
+        word = self._word("try_construct", [behavior.name for behavior in TryConstruct])
+        return TryConstruct.DISCARD if word is None else TryConstruct[word]
+
+    def unit(self) -> str | None:
+        given = self.argument("unit", "a text")
+        if given is None:
+            return None
+        if not isinstance(given, Literal) or not isinstance(given.value, str):
+            raise IdlError(given.place, "@unit takes a string")
+        return given.value
+
+    def limits(self) -> Limits | None:
+        """``@range(min=0, max=10)``, ``@min(0)`` and ``@max(10)``."""
+        limits: dict[str, float] = {}
+        for name in ("range", "min", "max"):
+            annotation = self.find(name)
+            for parameter, given in annotation.arguments.items() if annotation is not None else ():
+                number = evaluate(given, self._lookup)
+                if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
+                    raise IdlError(given.place, f"@{name} takes numbers")
+                limits[parameter if name == "range" else name] = number
+                if limits.keys() >= {"min", "max"} and limits["min"] > limits["max"]:
+                    raise IdlError(given.place, f"nothing lies between {limits['min']} and {limits['max']}")
+        return Limits(limits.get("min"), limits.get("max")) if limits else None
+
+    def representations(self) -> tuple[DataRepresentationId, ...]:
+        """``@data_representation(XCDR2)``, or several joined by ``|``; none where it is not there."""
+        given = self.argument("data_representation", "XCDR1 or XCDR2")
+        found: list[DataRepresentationId] = []
+        pending = [] if given is None else [given]
+        while pending:
+            match pending.pop():
+                case Binary(sign="|", left=left, right=right):
+                    pending += [right, left]
+                case Name(parts=(*_, ("XCDR1" | "XCDR2") as word)):
+                    found.append(DataRepresentationId[word])
+                case Name(parts=(*_, "XML")):
+                    pass  # nobody sends it
+                case other:
+                    raise IdlError(other.place, "@data_representation takes XCDR1, XCDR2 or XML, joined by |")
+        return tuple(found)
 
     def argument(self, name: str, expected: str) -> Expression | None:
         annotation = self.find(name)

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from .. import model
 from ..annotations import LARGEST_MEMBER_ID, autoid_hash
-from ..model import Extensibility, Primitive, String
+from ..model import Extensibility, Limits, Primitive, String
 from ..recursion import DEEPEST_COLLECTION
 from .annotations import Annotations
 from .constants import evaluate, fitted
@@ -222,6 +222,7 @@ class CompositeAnalysis:
         composite.is_hashed = annotations.is_hashed(default=self.is_hashed)
         is_topic = annotations.find("topic") is not None
         composite.is_nested = annotations.flag("nested", default=self.is_nested and not is_topic)
+        composite.representations = annotations.representations()
         return annotations
 
     def _base_struct(self, name: Name) -> StructDeclaration:
@@ -280,7 +281,20 @@ class CompositeAnalysis:
             hash_name=hash_name,
             is_external=annotations.flag("external"),
             must_understand=annotations.flag("must_understand"),
+            try_construct=annotations.try_construct(),
+            limits=self._limits(annotations, type_),
+            unit=annotations.unit(),
         )
+
+    def _limits(self, annotations: Annotations, type_: TypeReference) -> Limits | None:
+        limits, element = annotations.limits(), unaliased(type_)
+        while isinstance(element, (SequenceOf, ArrayOf)):
+            element = unaliased(element.element)
+        if limits is not None and not (isinstance(element, Primitive) and element.is_number):
+            place = next(found.place for name in ("range", "min", "max") if (found := annotations.find(name)))
+            self.warnings.append(IdlWarning(place, "a range for this type is ignored"))
+            return None
+        return limits
 
     def _default(self, annotations: Annotations, type_: TypeReference) -> ConstantValue | None:
         found = annotations.value("default")

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..model import Extensibility, Primitive, String
+from ...structure.qos_policies import DataRepresentationId
+from ..model import Extensibility, Limits, Primitive, String, TryConstruct
 from .source_text import IdlWarning, Place
 
 __all__ = [
@@ -179,6 +180,9 @@ class MemberDeclaration:
     is_external: bool = False
     is_serialized: bool = True
     must_understand: bool = False
+    try_construct: TryConstruct = TryConstruct.DISCARD
+    limits: Limits | None = None
+    unit: str | None = None
     default: ConstantValue | None = None
     labels: list[ConstantValue] = field(default_factory=list)
     is_default_case: bool = False
@@ -191,6 +195,7 @@ class _Composite(Declaration):
     extensibility: Extensibility = Extensibility.APPENDABLE
     is_hashed: bool = False
     is_nested: bool = False
+    representations: tuple[DataRepresentationId, ...] = ()
     members: list[MemberDeclaration] = field(default_factory=list)
     levels: int = 1
     """How deep structs and unions nest in it, itself included."""

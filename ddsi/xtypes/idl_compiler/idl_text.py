@@ -30,6 +30,7 @@ from ..model import (
     SequenceType,
     String,
     StructType,
+    TryConstruct,
     Typedefs,
     UnionType,
 )
@@ -311,6 +312,13 @@ class _Writer:
             marks.append("@external")
         if not member.is_serialized:
             marks.append("@non_serialized")
+        if member.try_construct is not TryConstruct.DISCARD:
+            marks.append(f"@try_construct({member.try_construct.name})")
+        if member.limits is not None:
+            limits = (("min", member.limits.minimum), ("max", member.limits.maximum))
+            marks += [f"@{name}({limit!r})" for name, limit in limits if limit is not None]
+        if member.unit is not None:
+            marks.append(f"@unit({self._constant(String(), member.unit)})")
         if member.default is not None and not isinstance(member, Case):
             value = member.default()
             if value is not None and isinstance(member.type, (Primitive, String, EnumType)) and _is_sayable(value):
@@ -442,7 +450,12 @@ def _template(name: str, parts: list[str], bound: int | None) -> str:
 
 
 def _type_marks(type_: Composite) -> list[str]:
-    return [f"@{type_.extensibility.value}{' @nested' if type_.is_nested else ''}"]
+    marks = [f"@{type_.extensibility.value}"]
+    marks += ["@nested"] if type_.is_nested else []
+    if isinstance(type_, StructType) and type_.representations:
+        names = [representation.name for representation in type_.representations]
+        marks.append(f"@data_representation({' | '.join(names)})")
+    return [" ".join(marks)]
 
 
 def _is_sayable(value: Any) -> bool:

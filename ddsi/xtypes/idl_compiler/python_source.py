@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..model import BOOLEAN, Extensibility, Primitive, String
+from ..model import BOOLEAN, Extensibility, Primitive, String, TryConstruct
 from .declarations import (
     Alias,
     ArrayOf,
@@ -243,6 +243,14 @@ class PythonSource:
             markers.append("idl.external")
         if not member.is_serialized:
             markers.append("idl.non_serialized")
+        if member.try_construct is not TryConstruct.DISCARD:
+            markers.append(f"idl.try_construct({quoted(member.try_construct.value)})")
+        if member.limits is not None:
+            limits = {"min": member.limits.minimum, "max": member.limits.maximum}
+            said = [f"{name}={limit!r}" for name, limit in limits.items() if limit is not None]
+            markers.append(f"idl.range({', '.join(said)})")
+        if member.unit is not None:
+            markers.append(f"idl.unit({quoted(member.unit)})")
         if attribute != member.name:
             markers.append(f"idl.name({quoted(member.name)})")
         return _annotated(type_, *markers) if markers else type_
@@ -326,6 +334,9 @@ def _composite_options(composite: StructDeclaration | UnionDeclaration, name: st
     options.append(f"extensibility={_EXTENSIBILITIES[composite.extensibility]}")
     options += ['autoid="hash"'] if composite.is_hashed else []
     options += ["nested=True"] if composite.is_nested else []
+    if composite.representations and isinstance(composite, StructDeclaration):
+        names = [f"idl.{representation.name}" for representation in composite.representations]
+        options.append(f"representations=({', '.join(names)}{',' if len(names) == 1 else ''})")
     return options
 
 

@@ -23,12 +23,14 @@ from ..model import (
     EnumType,
     Extensibility,
     IdlType,
+    Limits,
     MapType,
     Member,
     Primitive,
     SequenceType,
     String,
     StructType,
+    TryConstruct,
     Typedefs,
     UnionType,
 )
@@ -190,13 +192,13 @@ class _Builder:
 
     def _member(self, member: Member) -> MemberObject:
         type_ = self._identifier(member.type, member.typedefs)
-        return MemberObject(member.id, _member_flags(member), type_, named(member.name_in_idl), member.hash_name)
+        return MemberObject(member.id, _member_flags(member), type_, named(member.name_in_idl), *_annotations(member))
 
     def _case(self, case: Case) -> CaseObject:
         type_ = self._identifier(case.type, case.typedefs)
         flags = _member_flags(case) | (MemberFlag.DEFAULT if case.is_default else MemberFlag(0))
         labels = tuple(_int32(ord(label) if isinstance(label, str) else int(label)) for label in case.labels)
-        return CaseObject(case.id, flags, type_, labels, named(case.name_in_idl), case.hash_name)
+        return CaseObject(case.id, flags, type_, labels, named(case.name_in_idl), *_annotations(case))
 
 
 # --- what a type needs ---------------------------------------------------------------------------------------
@@ -292,8 +294,19 @@ def _type_flags(composite: Composite) -> TypeFlag:
     return flags
 
 
+_TRY_CONSTRUCT = {
+    TryConstruct.DISCARD: MemberFlag.TRY_CONSTRUCT_1,
+    TryConstruct.USE_DEFAULT: MemberFlag.TRY_CONSTRUCT_2,
+    TryConstruct.TRIM: MemberFlag.TRY_CONSTRUCT_1 | MemberFlag.TRY_CONSTRUCT_2,
+}
+
+
+def _annotations(member: Member) -> tuple[str | None, str | None, Limits | None]:
+    return member.hash_name, member.unit, member.limits
+
+
 def _member_flags(member: Member) -> MemberFlag:
-    flags = MemberFlag.TRY_CONSTRUCT_1  # DISCARD, the default; nothing else can be said
+    flags = _TRY_CONSTRUCT[member.try_construct]
     for is_set, flag in (
         (member.is_external, MemberFlag.EXTERNAL),
         (member.is_optional, MemberFlag.OPTIONAL),

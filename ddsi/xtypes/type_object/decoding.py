@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from ...serialization.cursor import Octets
+from ..model import Limits
 from .cursors import ObjectReader
 from .identifiers import PrimitiveIdentifier, TypeIdentifier, read_identifier
 from .kinds import COMPLETE, MINIMAL, MemberFlag, TypeKind, member_flags, type_flags
@@ -34,6 +35,7 @@ from .objects import (
     UnionObject,
     named,
 )
+from .parameter_values import read_number
 
 __all__ = ["decode_type_object", "read_type_object"]
 
@@ -66,6 +68,9 @@ def read_type_object(reader: ObjectReader) -> TypeObject:
         return TypeObject(is_complete, read(_Part(reader, is_complete=is_complete)))
 
 
+_Annotations = tuple[str | None, str | None, Limits | None]
+
+
 class _Part:
     """The body of one TypeObject, behind its kind."""
 
@@ -82,7 +87,9 @@ class _Part:
         return StructObject(flags, None if base == _NO_TYPE else base, self._sequence(self._member), type_name)
 
     def _member(self) -> MemberObject:
-        return MemberObject(*self._common(), *self._name_and_hashed())
+        id_, flags, type_ = self._common()
+        name, (hash_name, unit, limits) = self._name_and_annotations()
+        return MemberObject(id_, flags, type_, name, hash_name, unit, limits)
 
     def _common(self) -> tuple[int, MemberFlag, TypeIdentifier]:
         reader = self._reader
@@ -98,9 +105,10 @@ class _Part:
         return UnionObject(flags, discriminator_flags, discriminator, self._sequence(self._case), type_name)
 
     def _case(self) -> CaseObject:
-        common = self._common()
+        id_, flags, type_ = self._common()
         labels = tuple(self._reader.i32() for _ in range(self._reader.count(least_octets=4)))
-        return CaseObject(*common, labels, *self._name_and_hashed())
+        name, (hash_name, unit, limits) = self._name_and_annotations()
+        return CaseObject(id_, flags, type_, labels, name, hash_name, unit, limits)
 
     def alias(self) -> AliasObject:
         reader = self._reader
@@ -225,20 +233,32 @@ class _Part:
         self._skip_annotations()
         return named(text)
 
-    def _name_and_hashed(self) -> tuple[Named, str | None]:
-        """The name of a member, and what ``@hashid`` was given if it was there."""
+    def _name_and_annotations(self) -> tuple[Named, _Annotations]:
+        """The name of a member, what ``@hashid`` was given if it was there, its unit and its limits."""
+        annotations: _Annotations = None, None, None
         if not self._is_complete:
-            return self._name(), None
-        text, hash_name = self._text(), None
+            return self._name(), annotations
+        text = self._text()
         if self._reader.boolean():
             with self._reader.delimited():
-                # The specification puts unit, minimum and maximum before it.  Where one of these is there, the
-                # rest is left: member ids say all that matters.
-                if not any(self._reader.octets(3)) and self._reader.boolean():
-                    hash_name = self._reader.string()
+                annotations = self._builtin_annotations()
         if self._reader.boolean():
             self._reader.skip_delimited()
-        return named(text), hash_name
+        return named(text), annotations
+
+    def _builtin_annotations(self) -> _Annotations:
+        reader = self._reader
+        unit = self._text() if reader.boolean() else None
+        limits: list[float | None] = []
+        for _ in range(2):
+            limits.append(None)
+            if reader.boolean():
+                limits[-1] = read_number(reader)
+                if limits[-1] is None:  # then its end is not known either, and what follows is left
+                    return None, unit, None
+        minimum, maximum = limits
+        found = None if minimum is None and maximum is None else Limits(minimum, maximum)
+        return reader.string() if reader.boolean() else None, unit, found
 
     def _text(self) -> str:
         text = self._reader.string()

@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Sequence
 
 from ...structure.errors import BadParameter
+from ..model import Limits
 from .cursors import ObjectWriter
 from .identifiers import HASH_LENGTH, HashIdentifier, PrimitiveIdentifier, TypeIdentifier, write_identifier
 from .kinds import COMPLETE, MINIMAL, TypeKind
@@ -26,6 +27,7 @@ from .objects import (
     TypeObject,
     UnionObject,
 )
+from .parameter_values import write_number
 
 __all__ = ["encode_type_object", "equivalence_hash", "hash_of_objects", "hashed"]
 
@@ -104,7 +106,7 @@ class _Part:
             for member in struct.members:
                 with writer.delimited():
                     self._member(member)
-                    self._name(member.name, member.hash_name)
+                    self._name(member.name, member)
 
     def union(self, union: UnionObject) -> None:
         writer = self._writer
@@ -124,7 +126,7 @@ class _Part:
                     writer.u32(len(case.labels))
                     for label in case.labels:
                         writer.i32(label)
-                    self._name(case.name, case.hash_name)
+                    self._name(case.name, case)
 
     def _member(self, member: MemberObject | CaseObject) -> None:
         self._writer.u32(member.id)
@@ -201,22 +203,37 @@ class _Part:
         if self._is_complete:
             self._writer.string(type_name)
 
-    def _name(self, name: Named, hash_name: str | None = None) -> None:
-        """CompleteMemberDetail or MinimalMemberDetail; the only annotation that there may be is ``@hashid``."""
-        writer = self._writer
+    def _name(self, name: Named, annotated: MemberObject | CaseObject | None = None) -> None:
+        """CompleteMemberDetail or MinimalMemberDetail."""
         if not self._is_complete:
-            writer.octets(name.hash)
+            self._writer.octets(name.hash)
             return
-        writer.string(name.text)
-        if hash_name is None:
+        self._writer.string(name.text)
+        if annotated is None or (annotated.unit, annotated.limits, annotated.hash_name) == (None, None, None):
             self._no_annotations()
-            return
-        writer.boolean(True)  # builtin annotations
-        with writer.delimited():
-            writer.skip(3)  # no unit, min, max
-            writer.boolean(True)
-            writer.string(hash_name)
-        writer.boolean(False)  # custom annotations
+        else:
+            self._builtin_annotations(annotated)
+            self._writer.boolean(False)  # custom annotations
+
+    def _builtin_annotations(self, member: MemberObject | CaseObject) -> None:
+        """AppliedBuiltinMemberAnnotations: four optional members."""
+        limits = member.limits or Limits()
+        self._writer.boolean(True)
+        with self._writer.delimited():
+            self._optional_string(member.unit)
+            self._optional_number(limits.minimum)
+            self._optional_number(limits.maximum)
+            self._optional_string(member.hash_name)
+
+    def _optional_string(self, text: str | None) -> None:
+        self._writer.boolean(text is not None)
+        if text is not None:
+            self._writer.string(text)
+
+    def _optional_number(self, number: float | None) -> None:
+        self._writer.boolean(number is not None)
+        if number is not None:
+            write_number(self._writer, number)
 
     def _no_annotations(self) -> None:
         """Two optional members, builtin and custom annotations, that are not there."""

@@ -1,8 +1,8 @@
 """TypeObjects as values: what a type is made of, as programs tell each other (DDS-XTypes 1.3 §7.3.4 and Annex B).
 
 Minimal and complete TypeObjects are the same classes.  A complete one has names; a minimal one has the first four
-octets of the MD5 of each member's name.  Annotations that mean nothing to the encoding (units, ranges, custom ones) are
-not kept, but for ``hash_name``: what ``@hashid`` was given.
+octets of the MD5 of each member's name.  Of annotations those that IDL itself has are kept: what ``@hashid`` was given,
+``@unit`` and ``@range``; custom ones are not.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 
 from ...structure.dataclass import dataclass
+from ..model import Limits
 from .identifiers import TypeIdentifier
 from .kinds import MemberFlag, TypeFlag, TypeKind
 
@@ -65,6 +66,8 @@ class MemberObject:
     type: TypeIdentifier
     name: Named
     hash_name: str | None = None
+    unit: str | None = None
+    limits: Limits | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +90,8 @@ class CaseObject:
     labels: tuple[int, ...]
     name: Named
     hash_name: str | None = None
+    unit: str | None = None
+    limits: Limits | None = None
 
 
 @dataclass(frozen=True, slots=True)
