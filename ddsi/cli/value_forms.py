@@ -104,7 +104,8 @@ def _enum_form(type_: EnumType, value: Any) -> Form:
 
 
 def _flags_text(value: Any) -> str | int:
-    known = [flag for flag in type(value) if flag in value]
+    flags: type[enum.IntFlag] = type(value)
+    known = [flag for flag in flags if flag in value]
     rest = int(value) & ~sum(int(flag) for flag in known)
     return int(value) if rest or not known else "|".join(str(flag.name) for flag in known)
 
