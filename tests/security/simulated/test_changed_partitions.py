@@ -1,0 +1,96 @@
+"""A partition that changes on a live endpoint: rights are asked about again, by its owner and by everybody it matches.
+
+DDS-Security 1.1 §8.4.2.9.4-5 (creating), §8.4.2.9.10-11 (remote endpoints).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ddsi.config.secure import secure
+from ddsi.simulation import Domain, NodeReader, NodeWriter
+from ddsi.structure.errors import NotAllowedBySecurity
+from ddsi.structure.qos import Qos
+from ddsi.structure.qos_policies import KeepAll, Partition, Properties, Reliable
+from ddsi.structure.status import SecurityRefused
+from ddsi_security.keystore.documents import Rights
+from ddsi_security.keystore.keystore import IdentityTerms, create_keystore
+from ddsi_security.keystore.validity import Validity
+from ddsi_security.own_participant import OwnParticipant
+
+from .keystores import GOVERNANCES
+
+WALL_CLOCK_AT_START_NS = 1_700_000_000 * 10**9
+RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
+BLUE, ANY_BLUE, RED = (RELIABLE | Qos(partition=Partition(name)) for name in ("blue", "b*", "red"))
+
+
+@pytest.fixture(scope="module")
+def identities(tmp_path_factory: pytest.TempPathFactory) -> list[Properties]:
+    """Two who may be in partition blue, and in no other."""
+    folder: Path = tmp_path_factory.mktemp("keystore")
+    create_keystore(
+        folder, ("alice", "bob"),
+        terms=IdentityTerms(Validity.of_days(WALL_CLOCK_AT_START_NS)),
+        governance=GOVERNANCES["encrypt"], rights=Rights(partitions=("blue", "b*")),
+    )  # fmt: skip
+    found = [secure(folder / "enclaves" / name).properties for name in ("alice", "bob")]
+    assert all(found)
+    return found
+
+
+def matched(identities: list[Properties]) -> tuple[Domain, NodeWriter, NodeReader]:
+    domain = Domain()
+    alice, bob = (domain.node(properties=properties) for properties in identities)
+    writer, reader = alice.writer("Square", BLUE), bob.reader("Square", BLUE)
+    assert domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 10.0)
+    return domain, writer, reader
+
+
+def test_an_allowed_partition_changes_and_samples_go_on(identities: list[Properties]) -> None:
+    domain, writer, reader = matched(identities)
+    writer.change(ANY_BLUE)
+    domain.run(1.0)
+    writer.write()
+    assert domain.run_until(lambda: len(reader.taken) == 1, 2.0)
+
+
+def test_who_parts_by_a_partition_and_meets_again_has_new_keys(identities: list[Properties]) -> None:
+    domain, writer, reader = matched(identities)
+    writer.change(RELIABLE | Qos(partition=Partition("bluish")))
+    domain.run(1.0)
+    assert (writer.matched_count, reader.matched_count) == (0, 0)
+    reader.change(ANY_BLUE)
+    assert domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 5.0)
+    writer.write()
+    assert domain.run_until(lambda: len(reader.taken) == 1, 5.0)
+
+
+def test_an_owner_is_refused_a_partition_that_its_permissions_do_not_name(identities: list[Properties]) -> None:
+    domain, writer, reader = matched(identities)
+    for endpoint in (writer, reader):
+        before = endpoint.local.data
+        with pytest.raises(NotAllowedBySecurity, match="red"):
+            endpoint.change(RED)
+        assert endpoint.local.data == before
+    domain.run(1.0)
+    assert (writer.matched_count, reader.matched_count) == (1, 1)
+
+
+@pytest.mark.parametrize("who", ["writer", "reader"])
+def test_a_peer_that_changes_to_it_all_the_same_is_unmatched(
+    identities: list[Properties], monkeypatch: pytest.MonkeyPatch, who: str
+) -> None:
+    domain, writer, reader = matched(identities)
+    wrongdoer, witness = (writer, reader) if who == "writer" else (reader, writer)
+    protection = wrongdoer.local.protection
+    monkeypatch.setattr(OwnParticipant, "endpoint_changed", lambda self, data: protection)
+    wrongdoer.change(RELIABLE | Qos(partition=Partition("blue", "red")))  # the partitions still meet
+    domain.run(2.0)
+    assert witness.matched_count == 0
+    (refused,) = witness.node.statuses_of(SecurityRefused)
+    assert isinstance(refused, SecurityRefused)
+    assert refused.remote == wrongdoer.guid
+    assert "red" in refused.reason
