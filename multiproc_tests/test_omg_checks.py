@@ -119,6 +119,7 @@ JUDGED: list[tuple[Check, list[str], Code]] = [
     (checks.by_instance_or_in_order, _ordered(*["ABCABCABC"] * 5), Code.ORDERED_ACCESS_TOPIC),
     (checks.by_instance_or_in_order, _ordered("ABCABCABC", "AAABBBCCC", *["ABCABCABC"] * 3), Code.ORDERED_ACCESS_TOPIC),
     (checks.by_instance_or_in_order, _ordered(*["ABCABCABC", "AAABBBCCC", "AAABBBCCC"] * 2), Code.DATA_NOT_CORRECT),
+    (checks.by_instance_or_in_order, _ordered("ABC" * 12), Code.ORDERED_ACCESS_TOPIC),
     (checks.by_instance_or_in_order, _ordered(*["ABC"] * 11), Code.DATA_NOT_RECEIVED),
     (checks.by_instance_or_in_order, _ordered(*["ABCABCABC"] * 2), Code.DATA_NOT_RECEIVED),
     (checks.whole_sets, _sets(*FIVE_SETS), Code.OK),

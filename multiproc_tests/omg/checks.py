@@ -248,7 +248,7 @@ async def by_instance_or_in_order(output: Output, count: int) -> Code:
                 return Code.DATA_NOT_CORRECT
         if reads > count or await output.find(SAMPLE, _ORDERED_READ) is None:
             return Code.DATA_NOT_RECEIVED
-    return found or Code.DATA_NOT_RECEIVED
+    return found or _judge_read(colors) or Code.DATA_NOT_RECEIVED
 
 
 def _judge_read(colors: list[str]) -> Code | None:
