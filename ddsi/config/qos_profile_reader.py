@@ -176,7 +176,13 @@ class _Reader:
                 f"{self._place(element)} has a topic_filter, but only topics, writers and readers have topics"
             )
         found = EntityProfile(entity, self._place(element), filters, self._bases(element))
-        self._read_members(element, OMG[entity], found.settings)
+        policies = Element(element.name, element.line, {})
+        for child in element.children:
+            if child.name == "base_name":
+                found.bases += tuple(item.text for item in child.children)
+            else:
+                policies.children.append(child)
+        self._read_members(policies, OMG[entity], found.settings)
         return found
 
     def _read_fast_profiles(self, profiles: Element) -> None:

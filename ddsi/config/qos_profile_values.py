@@ -16,6 +16,7 @@ from .xml_document import Element
 __all__ = [
     "boolean",
     "count",
+    "count_or_zero",
     "duration",
     "integer",
     "literal",
@@ -66,6 +67,11 @@ def count(element: Element) -> int:
         return integer(element)
     except ValueError:
         raise ValueError("a whole number, or LENGTH_UNLIMITED") from None
+
+
+def count_or_zero(element: Element) -> int:
+    """As :func:`count`, where 0 means no limit too, as in Fast DDS."""
+    return count(element) or -1
 
 
 def literal(meanings: Mapping[str, object], suffix: str = "") -> Callable[[Element], object]:

@@ -94,9 +94,9 @@ _COERCION = values.literal(
 # --- policies, in the OMG's names and RTI's --------------------------------------------------------------------
 
 
-def _limits(policy: str) -> dict[str, Word]:
+def _limits(policy: str, read: Callable[[Element], object] = values.count) -> dict[str, Word]:
     names = ("max_samples", "max_instances", "max_samples_per_instance")
-    return {name: Leaf(f"{policy}.{name}", values.count) for name in names}
+    return {name: Leaf(f"{policy}.{name}", read) for name in names}
 
 
 def _pairs(setting: str, *, value_is_secret: bool) -> Members:
@@ -267,19 +267,23 @@ OMG: dict[str, Mapping[str, Word]] = {
 
 _FAST_PROPERTIES: Word = {
     "properties": Members("property.value", _pairs("", value_is_secret=True).words, element="property"),
-    **_skipped("binary_properties"),
 }
 _FAST_TOPIC: dict[str, Word] = {
     "historyQos": {"kind": Leaf("history.kind", _HISTORY), "depth": Leaf("history.depth", values.integer)},
     "resourceLimitsQos": {
-        **_limits("resource_limits"),
+        **_limits("resource_limits", values.count_or_zero),
         **_skipped("allocated_samples extra_samples"),
     },
     **_skipped("name dataType kind"),
 }
 _FAST_QOS: dict[str, Word] = {
     "durability": {"kind": Leaf("durability.kind", _DURABILITY)},
-    "durabilityService": _SERVICE,
+    "durabilityService": {
+        "service_cleanup_delay": Leaf("durability_service.service_cleanup_delay", values.duration),
+        "history_kind": Leaf("durability_service.history_kind", _HISTORY),
+        "history_depth": Leaf("durability_service.history_depth", values.integer),
+        **_limits("durability_service", values.count_or_zero),
+    },
     "deadline": {"period": Leaf("deadline.period", values.duration)},
     "latencyBudget": {"duration": Leaf("latency_budget.duration", values.duration)},
     "liveliness": {
@@ -291,7 +295,7 @@ _FAST_QOS: dict[str, Word] = {
         "kind": Leaf("reliability.kind", _RELIABILITY),
         "max_blocking_time": Leaf("reliability.max_blocking_time", values.duration),
     },
-    "destinationOrder": {"kind": Leaf("destination_order.kind", _ORDER)},
+    "destination_order": {"kind": Leaf("destination_order.kind", _ORDER)},
     "lifespan": _LIFESPAN,
     "ownership": {"kind": Leaf("ownership.kind", _OWNERSHIP)},
     "partition": {"names": Members("partition.name", {"": Leaf("", values.text)}, element="name")},
@@ -325,7 +329,9 @@ FAST: dict[str, Mapping[str, Word]] = {
                 "builtin port allocation prefix participantID sendSocketBufferSize listenSocketBufferSize "
                 "defaultUnicastLocatorList defaultMulticastLocatorList default_external_unicast_locators "
                 "ignore_non_matching_locators userTransports useBuiltinTransports throughputController "
-                "flow_controller_descriptor_list netmaskFilter easy_mode_ip"
+                "flow_controller_descriptor_list netmask_filter netmaskFilter easy_mode_ip builtinTransports "
+                "builtin_controllers_sender_thread timed_events_thread discovery_server_thread "
+                "typelookup_service_thread builtin_transports_reception_threads security_log_thread"
             ),
         },
         **_skipped("domainId"),
@@ -336,7 +342,8 @@ FAST: dict[str, Mapping[str, Word]] = {
         "qos": {
             **_FAST_QOS,
             "ownershipStrength": {"value": Leaf("ownership_strength.value", values.integer)},
-            **_skipped("publishMode disable_heartbeat_piggyback"),
+            "transport_priority": Leaf("transport_priority.value", values.integer),
+            **_skipped("publishMode disable_heartbeat_piggyback timeBasedFilter"),
         },
     },
     "reader": {
@@ -345,7 +352,7 @@ FAST: dict[str, Mapping[str, Word]] = {
             **_FAST_QOS,
             "timeBasedFilter": {"minimum_separation": Leaf("time_based_filter.minimum_separation", values.duration)},
         },
-        **_skipped("expectsInlineQos"),
+        **_skipped("expects_inline_qos expectsInlineQos"),
     },
 }
 """By entity, what may stand in ``<data_writer>`` and its like.  There are no profiles of publishers and subscribers

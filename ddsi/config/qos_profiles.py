@@ -102,21 +102,30 @@ class QosProvider:
     def _find(self, name: str) -> Profile:
         found = self._lookup(name, "")
         if found is None:
-            raise BadParameter(f"there is no QoS profile {name!r}; {self._there_are()}")
+            raise BadParameter(f"QoS profile {name!r} was asked for, {self._why_unknown(name)}")
         return found
 
     def _lookup(self, name: str, library: str) -> Profile | None:
-        """By its full name; by its own within ``library``; by its own where only one has it."""
+        """By its full name; by its own within ``library``; by its own where only one has it; a builtin one."""
         if found := self._profiles.get(name) or self._profiles.get(f"{library}::{name}"):
             return found
         alike = [profile for full, profile in self._profiles.items() if full.rpartition("::")[2] == name]
-        return alike[0] if len(alike) == 1 else None
+        if len(alike) == 1:
+            return alike[0]
+        from .rti_builtin_profiles import builtin_profile  # files for one product name them
+
+        return builtin_profile(name)
 
     def _default(self, entity: str) -> Profile:
         for profile in self._profiles.values():
             if entity in profile.defaults_for:
                 return profile
         raise BadParameter(f"no QoS profile is the default for a {entity}: name one; {self._there_are()}")
+
+    def _why_unknown(self, name: str) -> str:
+        if name.startswith("BuiltinQos"):
+            return "which is built into RTI Connext, and not known here; define a profile of this name in a file"
+        return f"which is in no file; {self._there_are()}"
 
     def _there_are(self) -> str:
         return f"there are {', '.join(self._profiles)}" if self._profiles else "the files hold none"
@@ -169,9 +178,7 @@ class _Resolution:
         for base in (*profile.bases, *(part.bases if part is not None else ())):
             found = self._provider._lookup(base, profile.library)
             if found is None:
-                raise ConfigurationError(
-                    f"{profile.place} builds on {base!r}, which is in no file; {self._provider._there_are()}"
-                )
+                raise ConfigurationError(f"{profile.place} builds on {base!r}, {self._provider._why_unknown(base)}")
             if len(above) < _MOST_LEVELS:
                 below, levels = self._resolve(found, (*above, profile.name))
                 settings.update(below)

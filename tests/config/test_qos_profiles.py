@@ -134,7 +134,7 @@ def test_names_and_defaults(omg: QosProvider) -> None:
     assert omg.writer() == omg.writer("Harbour::Pilot") == omg.writer("Pilot")
     assert omg.writer("Deep::Buoy") == ddsi.Qos(lifespan=ddsi.Lifespan(1))
     assert omg.reader("Deep::Buoy") == ddsi.Qos()
-    with pytest.raises(ddsi.BadParameter, match="no QoS profile 'Ferry'; there are Harbour::Base, "):
+    with pytest.raises(ddsi.BadParameter, match=r"'Ferry' was asked for, .* there are Harbour::Base, "):
         omg.writer("Ferry")
     with pytest.raises(ddsi.BadParameter, match="default for a writer"):
         QosProvider(FILES / "deep.xml").writer()
@@ -167,6 +167,39 @@ def test_rtis_dialect() -> None:
     assert provider.skipped[1].startswith(f"{FILES / 'rti.xml'}, line 8: <discovery>: it steers only")
 
 
+BUILTIN = """<dds>
+<qos_library name="L">
+  <qos_profile name="P" base_name="BuiltinQosLibExp::Generic.StrictReliable">
+    <datawriter_qos><history><depth>5</depth></history></datawriter_qos>
+    <datareader_qos>
+      <base_name><element>BuiltinQosSnippetLib::QosPolicy.Durability.TransientLocal</element></base_name>
+    </datareader_qos>
+  </qos_profile>
+  <qos_profile name="Q" base_name="{}"/>
+</qos_library></dds>"""
+
+
+def test_rtis_builtin_profiles_are_what_their_names_say_of_policies(written: Written) -> None:
+    provider = written(BUILTIN.format("BuiltinQosLib::Generic.KeepLastReliable.Persistent"))
+    assert provider.writer("P") == ddsi.Qos(reliability=ddsi.Reliable(), history=ddsi.KeepAll())
+    assert provider.reader("P") == provider.writer("P") | ddsi.Qos(durability=ddsi.TransientLocal())
+    assert provider.reader("Q") == ddsi.Qos(
+        reliability=ddsi.Reliable(), history=ddsi.KeepLast(1), durability=ddsi.Persistent()
+    )
+    assert provider.participant("P") == ddsi.Qos()
+
+
+def test_builtin_profiles_of_another_meaning_are_refused_above_all_those_of_security(written: Written) -> None:
+    """Read as nothing, a participant that was to be secured would be none."""
+    for name in ("BuiltinQosSnippetLib::Feature.Security.Enable", "BuiltinQosLib::Generic.Security"):
+        with pytest.raises(
+            ddsi.ConfigurationError, match=f"line 9: .*'{name}', which is built into RTI"
+        ):
+            written(BUILTIN.format(name))
+    own = "<qos_library name='BuiltinQosLib'><qos_profile name='Generic.Security'/></qos_library>"
+    written(BUILTIN.format("BuiltinQosLib::Generic.Security").replace("<dds>", f"<dds>{own}"))
+
+
 def test_fast_ddss_dialect() -> None:
     provider = QosProvider(FILES / "fast.xml")
     assert provider.participant() == ddsi.Qos(
@@ -188,6 +221,7 @@ def test_fast_ddss_dialect() -> None:
         lifespan=ddsi.Lifespan(math.inf),
         ownership=ddsi.Exclusive(),
         ownership_strength=ddsi.OwnershipStrength(5),
+        transport_priority=ddsi.TransportPriority(9),
         partition=ddsi.Partition("north", "south"),
         presentation=ddsi.Presentation(ddsi.AccessScope.GROUP, True, False),
         user_data=ddsi.UserData(b"\1"),
@@ -200,7 +234,8 @@ def test_fast_ddss_dialect() -> None:
     )
     assert provider.writer("cart") == ddsi.Qos(durability=ddsi.Volatile())
     assert provider.reader("press") == ddsi.Qos(durability=ddsi.Transient())
-    assert provider.topic("fruit") == ddsi.Qos(history=ddsi.KeepAll())
+    # To Fast DDS 0 is no limit.
+    assert provider.topic("fruit") == ddsi.Qos(history=ddsi.KeepAll(), resource_limits=ddsi.ResourceLimits())
     with pytest.raises(ddsi.BadParameter, match="default for a reader"):
         provider.reader()
 
