@@ -200,7 +200,7 @@ class DataReader(SampleReader[T], Endpoint):
     # --- inside ------------------------------------------------------------------------------------------
 
     def _resolve(self, merged: Qos) -> EndpointQos:
-        return _with_representations(reader_qos(merged))
+        return _with_representations(reader_qos(merged), self._topic.type_support.representations)
 
     def _local(self) -> LocalReader:
         return self._reader
@@ -274,12 +274,11 @@ class DataReader(SampleReader[T], Endpoint):
         self._delete(self._reader)
 
 
-def _with_representations(qos: EndpointQos) -> EndpointQos:
-    """A reader understands both, unless told to insist on one."""
+def _with_representations(qos: EndpointQos, possible: tuple[DataRepresentationId, ...]) -> EndpointQos:
+    """A reader understands both, unless it is told to insist on one, or the type is for one alone."""
     if qos.data_representation.ids:
         return qos
-    both = DataRepresentation(DataRepresentationId.XCDR1, DataRepresentationId.XCDR2)
-    return replace(qos, data_representation=both)
+    return replace(qos, data_representation=DataRepresentation(*sorted(possible)))
 
 
 def _key_codec(topic: Topic[T]) -> KeyCodec:

@@ -374,6 +374,8 @@ def _with_representation(qos: EndpointQos, possible: tuple[DataRepresentationId,
     wanted = qos.data_representation.ids or possible[:1]
     if wanted[0] not in (DataRepresentationId.XCDR1, DataRepresentationId.XCDR2):
         raise BadParameter(f"topic {topic.name!r}: {wanted[0].name} cannot be written; use XCDR1 or XCDR2")
+    if wanted[0] not in possible:
+        raise BadParameter(f"topic {topic.name!r}: its type is for {possible[0].name} alone, not for {wanted[0].name}")
     return replace(qos, data_representation=DataRepresentation(wanted[0]))
 
 

@@ -180,6 +180,23 @@ async def test_what_nobody_sets_is_the_omgs_default(domain: int) -> None:
 
 
 @in_trio
+async def test_a_type_may_be_for_one_representation_alone(domain: int) -> None:
+    """DDS-XTypes 1.3 §7.3.1.2.1.16, ``@data_representation``."""
+
+    @ddsi.idl.struct(extensibility=ddsi.idl.FINAL, representations=(ddsi.XCDR2,))
+    class Modern:
+        x: ddsi.idl.int32
+
+    old = ddsi.Qos(data_representation=ddsi.DataRepresentation(ddsi.XCDR1))
+    async with ddsi.DomainParticipant(domain) as participant:
+        topic = ddsi.Topic(participant, "Modern", Modern)
+        assert ddsi.DataWriter(participant, topic).endpoint_qos.data_representation.ids == (ddsi.XCDR2,)
+        assert ddsi.DataReader(participant, topic).endpoint_qos.data_representation.ids == (ddsi.XCDR2,)
+        with pytest.raises(ddsi.BadParameter, match="'Modern': its type is for XCDR2 alone, not for XCDR1"):
+            ddsi.DataWriter(participant, topic, old)
+
+
+@in_trio
 async def test_the_entitys_own_qos_goes_before_the_groups_and_that_before_the_topics(domain: int) -> None:
     async with ddsi.DomainParticipant(domain) as participant:
         topic = ddsi.Topic(
