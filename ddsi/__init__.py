@@ -138,14 +138,19 @@ if TYPE_CHECKING:
     from . import aio as aio
     from . import blocking as blocking
     from . import rpc as rpc
+    from .dcps.persistence_service import PersistenceService as PersistenceService
 else:
 
     def __getattr__(name: str) -> object:
-        """``ddsi.rpc`` after ``import ddsi`` alone: few programs need these rooms, so they are not imported before."""
+        """``ddsi.rpc`` after ``import ddsi`` alone: few programs need these, so they are not imported before."""
         if name in ("aio", "blocking", "rpc"):
             from importlib import import_module
 
             return import_module(f".{name}", __name__)
+        if name == "PersistenceService":
+            from .dcps.persistence_service import PersistenceService
+
+            return PersistenceService
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
@@ -215,6 +220,7 @@ __all__ = [
     "ParticipantBuiltinTopicData",
     "ParticipantSecurity",
     "Partition",
+    "PersistenceService",
     "Persistent",
     "PreconditionNotMet",
     "Presentation",

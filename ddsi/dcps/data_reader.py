@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import trio
 
@@ -30,6 +30,7 @@ from ..structure.status import (
     Status,
     SubscriptionMatched,
 )
+from ..xtypes.type_support import TypeSupport
 from .content_filtered_topic import ContentFilteredTopic
 from .endpoint import Endpoint, QosPlan
 from .entity import deadline_scope
@@ -41,7 +42,7 @@ from .topic import Topic
 if TYPE_CHECKING:
     from .participant import DomainParticipant
 
-__all__ = ["DataReader"]
+__all__ = ["DataReader", "key_codec"]
 
 T = TypeVar("T")
 
@@ -105,7 +106,7 @@ class DataReader(SampleReader[T], Endpoint):
             self._pump.now(),
             is_enabled=self._is_enabled,
             is_keyed=support.is_keyed,
-            keys=_key_codec(topic) if support.is_keyed else None,
+            keys=key_codec(support) if support.is_keyed else None,
             content_filter=(filtered._announced, filtered._evaluate) if filtered is not None else None,
             types=support.type_description if self._pump.engine.config.announce_types else None,
             group=parent._group if isinstance(parent, Subscriber) else None,
@@ -281,8 +282,8 @@ def _with_representations(qos: EndpointQos, possible: tuple[DataRepresentationId
     return replace(qos, data_representation=DataRepresentation(*sorted(possible)))
 
 
-def _key_codec(topic: Topic[T]) -> KeyCodec:
-    support = topic.type_support
+def key_codec(support: TypeSupport[Any]) -> KeyCodec:
+    """How the engine finds the instances of this type."""
     return KeyCodec(
         from_payload=support.key_from_payload,
         from_key_payload=support.key_from_key_payload,
