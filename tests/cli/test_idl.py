@@ -64,7 +64,7 @@ def test_a_definition_has_a_name(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_the_example_of_the_documentation_is_true(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The IDL in docs/idl.md becomes the Python beside it, and its other Python runs."""
     (shapes,) = re.findall(r"```idl\n(.*?)```", DOCUMENTATION, re.S)
-    loading, expected, union = re.findall(r"```python\n(.*?)```", DOCUMENTATION, re.S)
+    loading, expected, union, _network = re.findall(r"```python\n(.*?)```", DOCUMENTATION, re.S)
     (tmp_path / "shapes.idl").write_text(shapes)
     assert main(["idl", str(tmp_path / "shapes.idl")]) == 0
     assert capsys.readouterr().out.endswith(f"\n\n{expected}")
