@@ -19,7 +19,7 @@ from pathlib import Path
 
 from ..framework.errors import Unavailable
 
-__all__ = ["CYCLONE", "CYCLONE_SHAPE_MAIN", "FASTDDS", "PROGRAMS", "Recipe", "build"]
+__all__ = ["CYCLONE", "CYCLONE_SHAPE_MAIN", "FASTDDS", "FASTDDS_FILTERED", "PROGRAMS", "Recipe", "build"]
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = Path(__file__).resolve().parent / "programs"
@@ -81,6 +81,20 @@ FASTDDS = Recipe(
         (
             *("g++", "-std=c++17", "-O1", "-Wall", "-Wextra", "-Wno-deprecated-declarations", "-I", "{sources}"),
             *("{sources}/fastdds_shapes.cpp", "-o", "fastdds_shapes", "-lfastrtps", "-lfastcdr"),
+        ),
+    ),
+)
+
+FASTDDS_FILTERED = Recipe(
+    program="fastdds_filtered",
+    sources=("fastdds_filtered.cpp",),
+    tools=("g++",),
+    header="/usr/include/fastdds/dds/topic/ContentFilteredTopic.hpp",
+    packages="g++ libfastrtps-dev libfastcdr-dev",
+    commands=(
+        (
+            *("g++", "-std=c++17", "-O1", "-Wall", "-Wextra", "-Wno-deprecated-declarations"),
+            *("{sources}/fastdds_filtered.cpp", "-o", "fastdds_filtered", "-lfastrtps", "-lfastcdr"),
         ),
     ),
 )
