@@ -371,6 +371,23 @@ class DiscoveryAgent:
     def announce_reader(self, reader: LocalReader, now: float) -> None:
         self._announce(_sedp_writer(reader), reader.guid, encode_reader(reader.data), now)
 
+    def withdraw_types(self, endpoint: LocalWriter | LocalReader, now: float) -> None:
+        """From now on the endpoint says nothing of what its type is made of, so that peers go by the type's name.
+
+        Peers take no change of that of an endpoint that they know; so it is gone, and is there again.  The dispose must
+        not be replaced in the history by what follows: it counts as another instance there.
+        """
+        if not endpoint.data.type_information:
+            return
+        guid, writer_id = endpoint.guid, _sedp_writer(endpoint)
+        self._announce_gone(writer_id, guid, now, key=guid + b"type")
+        if isinstance(endpoint, LocalWriter):
+            endpoint.data = replace(endpoint.data, type_information=b"")
+            self.announce_writer(endpoint, now)
+        else:
+            endpoint.data = replace(endpoint.data, type_information=b"")
+            self.announce_reader(endpoint, now)
+
     def announce_gone(self, endpoint: LocalWriter | LocalReader, now: float) -> None:
         self._announce_gone(_sedp_writer(endpoint), endpoint.guid, now)
 
@@ -378,10 +395,12 @@ class DiscoveryAgent:
         self._prune_farewells(now)
         self._engine.write_builtin(writer_id, ChangeKind.ALIVE, payload, guid, now)
 
-    def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float) -> None:
+    def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float, *, key: bytes = b"") -> None:
         self._prune_farewells(now)
+        engine, kind = self._engine, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED
         payload = encode_key(guid, ParameterId.ENDPOINT_GUID)
-        change = self._engine.write_builtin(writer_id, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, payload, guid, now)
+        writer = engine.local_writers[Guid.of(engine.guid.prefix, writer_id)]
+        change = engine.write(writer, kind, payload, key or guid, now, key_hash=guid)
         self._farewells.append((now, writer_id, change.sequence_number))
 
     def _prune_farewells(self, now: float) -> None:

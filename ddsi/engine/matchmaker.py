@@ -18,7 +18,7 @@ from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData,
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
-from ..trace.reasons import LossReason
+from ..trace.reasons import LossReason, TypeStep
 from .content_filters import writer_side_filter
 from .local_endpoints import LocalReader, LocalWriter
 from .type_matching import TypeVerdict
@@ -140,7 +140,7 @@ class Matchmaker:
                 writer.behavior.matched_reader_update(data.guid, data, participant.user_traffic(data.unicast))
             else:
                 self._unmatch_reader(writer, data.guid, LossReason.REJECTED_BY_SECURITY, now)
-        elif self._types_fit(writer.guid, data, types):
+        elif self._types_fit(writer, data, types, now):
             admission = engine.hooks.match(writer.guid, data)
             if self._admits(writer.guid, data.guid, data.topic_name, admission):
                 self._match_reader(writer, data, now)
@@ -165,7 +165,7 @@ class Matchmaker:
                 proxy.locators = participant.user_traffic(data.unicast)
             else:
                 self.unmatch_writer(reader, data.guid, LossReason.REJECTED_BY_SECURITY, now)
-        elif self._types_fit(reader.guid, data, types):
+        elif self._types_fit(reader, data, types, now):
             admission = engine.hooks.match(reader.guid, data)
             if self._admits(reader.guid, data.guid, data.topic_name, admission):
                 self._match_writer(reader, data, now)
@@ -184,7 +184,7 @@ class Matchmaker:
             writer.behavior.local_readers[reader.guid].data = reader.data
             reader.behavior.writers[writer.guid].data = writer.data
             _tell_history(reader, writer.data)
-        elif writer.guid not in self._engine.closing and self._types_fit(writer.guid, reader.data, types):
+        elif writer.guid not in self._engine.closing and self._types_fit(writer, reader.data, types, now):
             self._match_local(writer, reader, now)
 
     # --- types -------------------------------------------------------------------------------------------
@@ -197,9 +197,11 @@ class Matchmaker:
         types = self._engine.type_matching.judge(writer, reader, now, may_ask=refusal is None)
         return types.refusal or refusal, types
 
-    def _types_fit(self, local: Guid, remote: DiscoveredEndpointData, types: TypeVerdict) -> bool:
+    def _types_fit(
+        self, endpoint: LocalWriter | LocalReader, remote: DiscoveredEndpointData, types: TypeVerdict, now: float
+    ) -> bool:
         """A pair that is not refused and not matched yet: may it be, or does it wait for types?"""
-        engine = self._engine
+        engine, local = self._engine, endpoint.guid
         is_news = True
         if types.is_awaited:
             is_news = engine.type_matching.wait(local, remote.guid)
@@ -207,6 +209,8 @@ class Matchmaker:
             engine.type_matching.no_longer_waiting(local, remote.guid)
         if types.step is not None and is_news:
             engine.recorder.types_compared(local, remote.guid, remote.topic_name, types.step, types.detail)
+        if types.step is TypeStep.EXTENSIBILITY and remote.guid.prefix != engine.guid.prefix:
+            engine.discovery.withdraw_types(endpoint, now)  # or the other would refuse us
         return not types.is_awaited
 
     def types_learnt(self, prefix: bytes, now: float) -> None:
