@@ -73,10 +73,10 @@ class Config:
     spdp_interval: float | None = None
     """Seconds between announcements, once the first quick ones are out.  None: see :attr:`announcement_period`."""
 
-    announce_types: bool = False
-    """Announce what types are made of (XTypes TypeInformation) with writers and readers?  Off, peers match by type
-    names.  On, those that know TypeInformation match by it; but one whose hashes of the type are others, as Cyclone DDS
-    0.10's are, asks for TypeObjects, gets none from us yet, and does not match."""
+    announce_types: bool = True
+    """Announce what types are made of (XTypes TypeInformation) with writers and readers?  Then peers that do so too
+    match by what the types are made of, evolved ones included, and whoever asks is told it.  Off, our endpoints match
+    by type names alone, and nobody learns their types from us."""
 
     # --- sizes ---
     max_message_size: int | None = None

@@ -54,7 +54,11 @@ class TypeAnswers:
         self._under_way: dict[bytes, list[tuple[EntityId, int]]] = {}
 
     def receive_request(self, change: CacheChange, now: float, *, is_secure: bool) -> None:
-        """A question; every one gets an answer, though it may be that there is nothing."""
+        """A question; every one gets an answer, though it may be that there is nothing.
+
+        The answer goes to who wrote the question.  Who that is by the question's own id does not matter: Cyclone DDS
+        0.10 swaps the octets of its Guid there.
+        """
         engine = self._engine
         prefix = change.writer_guid.prefix
         if change.kind is not ChangeKind.ALIVE:
@@ -63,9 +67,6 @@ class TypeAnswers:
             request = decode_request(change.payload)
         except MalformedMessage as error:
             engine.dropped_discovery(change, str(error))
-            return
-        if request.request_id[0].prefix != prefix:
-            engine.dropped_discovery(change, f"asks in the name of {request.request_id[0]}")
             return
         writer_id = ids.TYPE_LOOKUP_REPLY_SECURE_WRITER if is_secure else ids.TYPE_LOOKUP_REPLY_WRITER
         if not is_secure and self._has_secure(prefix):

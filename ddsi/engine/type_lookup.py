@@ -212,7 +212,11 @@ class TypeLookup:
     # --- answers -----------------------------------------------------------------------------------------
 
     def receive_reply(self, change: CacheChange, now: float) -> None:
-        """An answer; all participants may hear those to others."""
+        """An answer; all participants may hear those to others.
+
+        Whose it is, Cyclone DDS 0.10 does not say: it puts its own Guid there, with octets swapped.  So one that brings
+        what was asked for serves, whoever asked: it is taken by its hash.
+        """
         engine = self._engine
         if change.kind is not ChangeKind.ALIVE:
             return
@@ -224,9 +228,11 @@ class TypeLookup:
         prefix = change.writer_guid.prefix
         inquiry = self._inquiries.get(prefix)
         guid, number = reply.request_id
-        if guid.prefix != engine.guid.prefix:
+        if inquiry is None or inquiry.asked is None:
+            engine.dropped(DropReason.NOT_FOR_US, None, f"{change.writer_guid} answers {guid}, and was not asked")
+        elif guid.prefix != engine.guid.prefix and not _answers(reply, inquiry):
             engine.dropped(DropReason.NOT_FOR_US, None, f"{change.writer_guid} answers {guid}")
-        elif inquiry is None or inquiry.asked is None or number not in inquiry.numbers:
+        elif guid.prefix == engine.guid.prefix and number not in inquiry.numbers:
             engine.dropped(DropReason.DUPLICATE, None, f"{change.writer_guid} answers question {number} once more")
         else:
             self._take(prefix, inquiry, reply, now)
@@ -296,3 +302,12 @@ class TypeLookup:
         self.registry.participant_lost(prefix)
         if self._inquiries.pop(prefix, None) is not None:
             self._engine.alarms.type_lookup(prefix, math.inf)
+
+
+def _answers(reply: TypeLookupReply, inquiry: _Inquiry) -> bool:
+    """Does it bring a type that is wanted?"""
+    match reply.result:
+        case FoundTypes(types=types):
+            return any(identifier in inquiry.wanted for identifier in hashed_only(one for one, _ in types))
+        case _:
+            return False

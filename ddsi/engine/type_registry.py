@@ -56,7 +56,7 @@ class TypeRegistry:
         for types in (description.minimal, description.complete):
             self._own |= types.objects
             self._own_octets |= types.octets
-        self._minimal_of |= zip(description.complete.objects, description.minimal.objects, strict=True)
+        self._minimal_of[description.complete.root] = description.minimal.root
 
     def own_octets(self, identifier: TypeIdentifier) -> bytes | None:
         """The TypeObject of one of our types as it is sent; None if it is none of ours."""
@@ -65,7 +65,10 @@ class TypeRegistry:
     def minimal_of(
         self, identifiers: Iterable[TypeIdentifier]
     ) -> tuple[tuple[HashedIdentifier, HashedIdentifier], ...]:
-        """The complete identifiers of our types that are among them, each with its minimal one."""
+        """The complete identifiers of our topic types that are among them, each with its minimal one.
+
+        Of the types that these need it is not told: several of them may have one minimal TypeObject.
+        """
         complete = [one for one in hashed_only(identifiers) if one in self._minimal_of]
         return tuple((one, self._minimal_of[one]) for one in complete)
 

@@ -32,6 +32,7 @@ from ..structure.qos_policies import Properties
 from ..structure.status import Status
 from ..trace.events import Remark
 from ..trace.sink import TraceSink
+from ..xtypes.type_object import TypeDescription
 from .dice import Dice
 from .endpoints import SIMULATED_KEYS, BookKeeper, NodeReader, NodeWriter
 from .groups import NodePublisher, NodeSubscriber
@@ -195,11 +196,15 @@ class Node:
         type_name: str = "T",
         compile_filter: CompileFilter | None = None,
         publisher: NodePublisher | None = None,
+        types: TypeDescription | None = None,
     ) -> NodeWriter:
-        """``filters``: each change has a destination.  ``compile_filter``: it evaluates readers' content filters."""
+        """``filters``: each change has a destination.  ``compile_filter``: it evaluates readers' content filters.
+
+        ``types``: what is announced of the type; the octets that are written are of none.
+        """
         local = self.engine.create_writer(
             topic, type_name, writer_qos(qos), self.now, is_keyed=keyed, filters=filters, compile_filter=compile_filter,
-            group=publisher.group if publisher is not None else None,
+            group=publisher.group if publisher is not None else None, types=types,
         )  # fmt: skip
         writer = NodeWriter(self, local)
         self.writers.append(writer)
@@ -217,12 +222,13 @@ class Node:
         type_name: str = "T",
         content_filter: tuple[ContentFilterProperty, Evaluate] | None = None,
         subscriber: NodeSubscriber | None = None,
+        types: TypeDescription | None = None,
     ) -> NodeReader:
         keys = SIMULATED_KEYS if keyed else None
         group = subscriber.group if subscriber is not None else None
         local = self.engine.create_reader(
             topic, type_name, reader_qos(qos), self.now, is_keyed=keyed, keys=keys, uses_filter=uses_filter,
-            content_filter=content_filter, group=group,
+            content_filter=content_filter, group=group, types=types,
         )  # fmt: skip
         reader = NodeReader(self, local, self._books.books[local.guid], takes=takes)
         self.readers.append(reader)
