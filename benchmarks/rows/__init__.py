@@ -5,6 +5,7 @@ from benchmarks.benchmark import Benchmark
 from . import (
     codec,
     discovery,
+    filters,
     floors,
     footprint,
     hooks,
@@ -26,6 +27,7 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     *matching.BENCHMARKS,
     *footprint.BENCHMARKS,
     *discovery.BENCHMARKS,
+    *filters.BENCHMARKS,
     *hooks.BENCHMARKS,
     *secured.BENCHMARKS,
     *security_handshake.BENCHMARKS,

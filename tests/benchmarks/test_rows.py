@@ -30,7 +30,7 @@ LEFT_OUT |= {benchmark.name for benchmark in BENCHMARKS if benchmark.name.starts
     "secured/throughput/64KiB/all",
     "secured/first-sample",
 }
-LEFT_OUT |= {"discovery/10", "discovery/50", "discovery/200"}
+LEFT_OUT |= {"filters/1", "filters/32", "discovery/10", "discovery/50", "discovery/200"}
 ROWS = [benchmark for benchmark in BENCHMARKS if benchmark.name not in LEFT_OUT]
 
 has_secured_peer = (
