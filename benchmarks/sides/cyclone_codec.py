@@ -9,7 +9,6 @@ is the package's default for each type.
 # pyright: basic, reportInvalidTypeForm=false, reportInvalidTypeArguments=false, reportArgumentType=false
 # pyright: reportCallIssue=false
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +17,7 @@ from cyclonedds.idl import IdlStruct, IdlUnion
 from cyclonedds.idl.annotations import final, mutable
 from cyclonedds.idl.types import case, default, float32, float64, int16, int32, sequence, uint8, uint32
 
+from .bursts import quickest_burst
 from .cyclone import maker_of
 from .protocol import play
 
@@ -131,22 +131,24 @@ SAMPLES: dict[str, Callable[[], Any]] = {
 
 def serialise(name: str, count: int) -> dict[str, float]:
     sample = SAMPLES[name]()
-    sample.serialize()
-    start = time.perf_counter()
-    for _ in range(count):
-        sample.serialize()
-    return {"us": (time.perf_counter() - start) / count * 1e6}
+
+    def burst(calls: int) -> None:
+        for _ in range(calls):
+            sample.serialize()
+
+    return {"us": quickest_burst(burst, count)}
 
 
 def deserialise(name: str, count: int) -> dict[str, float]:
     sample = SAMPLES[name]()
     kind: type[Any] = type(sample)
     data = sample.serialize()
-    kind.deserialize(data)
-    start = time.perf_counter()
-    for _ in range(count):
-        kind.deserialize(data)
-    return {"us": (time.perf_counter() - start) / count * 1e6}
+
+    def burst(calls: int) -> None:
+        for _ in range(calls):
+            kind.deserialize(data)
+
+    return {"us": quickest_burst(burst, count)}
 
 
 if __name__ == "__main__":

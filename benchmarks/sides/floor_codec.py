@@ -6,10 +6,10 @@ No object is made of them, no alignment is found, and nothing is checked.
 from __future__ import annotations
 
 import struct
-import time
 from collections.abc import Callable
 from typing import Any
 
+from .bursts import quickest_burst
 from .protocol import PAYLOAD_BYTE, play
 
 _OCTETS = {"1KiB": 1 << 10, "64KiB": 1 << 16, "1MiB": 1 << 20, "float64": 1 << 20}
@@ -48,11 +48,11 @@ def deserialise(name: str, count: int) -> dict[str, float]:
 
 
 def _microseconds(operation: Callable[[], object], count: int) -> dict[str, float]:
-    operation()
-    start = time.perf_counter()
-    for _ in range(count):
-        operation()
-    return {"us": (time.perf_counter() - start) / count * 1e6}
+    def burst(calls: int) -> None:
+        for _ in range(calls):
+            operation()
+
+    return {"us": quickest_burst(burst, count)}
 
 
 if __name__ == "__main__":
