@@ -10,19 +10,20 @@ A minimal TypeObject has no names: its types, members and literals are called af
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 from ..structure.dataclass import dataclass
 from ..structure.errors import BadParameter
 from . import idl
-from .annotations import Array, Bits, Bound, CaseLabels, HashId, MemberId, MemberName, TypedefName, autoid_hash
+from .annotations import Array, Bits, Bound, CaseLabels, HashId, MemberId, MemberName, TypedefName, Unit, autoid_hash
 from .bitsets import define_bitset
 from .definition import define_struct
 from .dynamic_graph import TypeGraph, plain, shown_name
 from .dynamic_names import class_name, literal_name, member_name
 from .enumerations import describe_bitmask, describe_enum
-from .model import Extensibility, StructType, UnionType
+from .model import Extensibility, Limits, StructType, TryConstruct, UnionType
 from .resolution import named_type
 from .topic_type import refuse_impossible
 from .type_object.builder import BuiltTypes
@@ -81,6 +82,12 @@ _MARKS = (
     (MemberFlag.MUST_UNDERSTAND, idl.must_understand),
     (MemberFlag.EXTERNAL, idl.external),
 )
+
+_BOTH = MemberFlag.TRY_CONSTRUCT_1 | MemberFlag.TRY_CONSTRUCT_2
+
+_TRY_CONSTRUCT = {MemberFlag.TRY_CONSTRUCT_2: TryConstruct.USE_DEFAULT, _BOTH: TryConstruct.TRIM}
+
+_NO_NUMBERS = (TypeKind.BOOLEAN, TypeKind.CHAR8, TypeKind.CHAR16)
 
 _EXTENSIBILITIES = {
     TypeFlag.FINAL: Extensibility.FINAL,
@@ -229,9 +236,24 @@ class _Classes:
         hash_name = member.hash_name
         is_hashed = hash_name is not None and autoid_hash(hash_name or member.name.text) == member.id
         markers.append(HashId(hash_name or "") if is_hashed else MemberId(member.id))
+        markers.append(_TRY_CONSTRUCT.get(member.flags & _BOTH, TryConstruct.DISCARD))
+        if member.unit is not None:
+            markers.append(Unit(member.unit))
+        if member.limits is not None and self._has_numbers(member.type):
+            markers += _sensible(member.limits)
         if member.name.text not in ("", name):
             markers.append(MemberName(member.name.text))
         return _annotated(self._said(member.type), *markers)
+
+    def _has_numbers(self, type_: TypeIdentifier) -> bool:
+        """Whether limits mean something: of a number, or of the numbers in a sequence or array."""
+        type_ = self._graph.unaliased(type_)
+        if isinstance(type_, SequenceIdentifier):
+            type_ = self._graph.unaliased(type_.element)
+        else:
+            while isinstance(type_, ArrayIdentifier):
+                type_ = self._graph.unaliased(type_.element)
+        return isinstance(type_, PrimitiveIdentifier) and type_.kind not in _NO_NUMBERS
 
     def _label(self, discriminator: TypeIdentifier, label: int) -> Any:
         """The value of the discriminator's type for a label, which a TypeObject has as an int32."""
@@ -360,6 +382,12 @@ def _extensibility(flags: TypeFlag) -> Extensibility:
     if found is None:
         raise BadParameter("it is of two kinds of extensibility at once")
     return found
+
+
+def _sensible(limits: Limits) -> list[Limits]:
+    """Nothing where a stranger's limits are no numbers, or would allow none."""
+    given = [limit for limit in (limits.minimum, limits.maximum) if limit is not None]
+    return [limits] if all(map(math.isfinite, given)) and given == sorted(given) else []
 
 
 def _autoid(flags: TypeFlag) -> str:

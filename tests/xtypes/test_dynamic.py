@@ -91,7 +91,14 @@ module m {
   @mutable struct Link { @hashid("to") sequence<Node> nodes; @id(77) @must_understand long cost; };
   @appendable struct Node { @external @optional Link link; string name; };
   union Choice switch (@key Colour) { case RED: Node node; case from: wstring<5> class; default: octet raw[3]; };
-  @appendable @autoid(HASH) struct Top : Base { Atlas atlas; Choice choice; Flags flags; Fields fields; Node tree; };
+  typedef long Row[2];
+  @final struct Noted {
+    @unit("m/s") @range(min=-1.5, max=9.0) double speed; @try_construct(TRIM) string<3> tag; @max(4) Row rows[3];
+    @try_construct(USE_DEFAULT) @min(1) sequence<short, 2> few;
+  };
+  @appendable @autoid(HASH) struct Top : Base {
+    Noted noted; Atlas atlas; Choice choice; Flags flags; Fields fields; Node tree;
+  };
 };
 """
 
@@ -114,6 +121,23 @@ def test_samples_are_like_those_of_any_other_class() -> None:
     with pytest.raises(ddsi.BadParameter, match="name: 5 is no string"):
         ddsi.serialize(dynamic(None, 5))
     assert ddsi.deserialize(dynamic, ddsi.serialize(m.Node(None, "b"))) == dynamic(None, "b")
+
+
+def test_limits_and_what_becomes_of_unfit_values_are_known() -> None:
+    m: Any = idl.loads(EVERYTHING).m
+    dynamic = ddsi.dynamic_type(received(m.Noted))
+    with pytest.raises(ddsi.BadParameter, match="speed: 10[.]0 is beyond its range"):
+        ddsi.serialize(dynamic(10.0, "", [[0, 0]] * 3, [1]))
+
+    @idl.struct(typename="m::Noted", extensibility=idl.FINAL)
+    class Loose:
+        speed: idl.float64
+        tag: str
+        rows: Annotated[idl.sequence[idl.sequence[idl.int32]], idl.array(3, 2)]
+        few: idl.sequence[idl.int16]
+
+    octets = ddsi.serialize(Loose(1.0, "abcdef", [[0, 0]] * 3, [1, 2, 3]))
+    assert ddsi.deserialize(dynamic, octets) == dynamic(1.0, "abc", [[0, 0]] * 3, [])
 
 
 def test_optional_members_may_be_left_out_where_nothing_follows_them() -> None:

@@ -13,6 +13,7 @@ import ddsi
 from ddsi.structure.errors import BadParameter, MalformedMessage
 from ddsi.xtypes import type_support
 from ddsi.xtypes.dynamic_graph import DEEPEST_TYPE, MOST_MEMBERS_OF_ONE, MOST_TYPES
+from ddsi.xtypes.model import Limits
 from ddsi.xtypes.type_object import BuiltTypes, HashIdentifier, TypeIdentifier, TypeObject, decode_type_object
 from ddsi.xtypes.type_object.identifiers import (
     ArrayIdentifier,
@@ -318,6 +319,22 @@ def test_literals_may_have_any_names() -> None:
     assert len(type(found.m0).__members__) == len(names)
     assert len(type(found.m1).__members__) == len(names)
     assert (int(found.m0), int(found.m1)) == (5, 0xFF)
+
+
+@pytest.mark.parametrize("limits", [Limits(float("nan")), Limits(0, float("inf")), Limits(2, 1), Limits(0, 9)], ids=str)
+@pytest.mark.parametrize(
+    "type_",
+    [
+        *(INT32, StringIdentifier(), SequenceIdentifier(hash_of(1)), hash_of(1)),
+        *(SequenceIdentifier(ArrayIdentifier(INT32, (2,))), ArrayIdentifier(SequenceIdentifier(INT32), (1,))),
+    ],
+    ids=repr,
+)
+def test_limits_that_make_no_sense_are_left_out(limits: Limits, type_: TypeIdentifier) -> None:
+    annotated = MemberObject(1, PLAIN, type_, named("a"), limits=limits)
+    dynamic = ddsi.dynamic_type(types_of(struct(annotated), enumeration(0, 1)))
+    value: Any = type_support(dynamic).deserialize(b"\0\1\0\0\0\0\0\0")
+    assert len(ddsi.serialize(value)) > 4
 
 
 def test_an_enum_without_literals_is_a_number() -> None:
