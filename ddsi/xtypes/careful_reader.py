@@ -108,8 +108,9 @@ class _CarefulReader:
     def fail(self, reason: str) -> NoReturn:
         path = "".join(self._path).lstrip(".")
         where = f"{path}: " if path else ""
-        message = f"{self._type.type_name}: {where}{reason} (octet {self._position})"
-        raise MalformedSample(message, path=path, offset=self._position)
+        offset = min(self._position, len(self._data))  # aligning may have gone beyond the end
+        message = f"{self._type.type_name}: {where}{reason} (octet {offset})"
+        raise MalformedSample(message, path=path, offset=offset)
 
     def _unfit(self, reason: str) -> None:
         """What was read is no value of its type, but its octets are in order: a member around may have its default."""

@@ -157,7 +157,7 @@ class _KeyFinder:
     def _skip(self, type_: IdlType) -> None:
         emitter = self._emitter
         size = static_size(type_, emitter.residue, self._encoding)
-        if size is not None:
+        if size is not None and _is_rigid(type_, self._encoding):
             emitter.pass_over(size)
             return
         self._skipped += 1
@@ -198,6 +198,24 @@ class _KeyFinder:
         end = self._source.fresh("e")
         emitter.then(f"{end} = {emitter.position} + {count}" + (f" * {size}" if size > 1 else ""))
         emitter.move(end, residue)
+
+
+def _is_rigid(type_: IdlType, encoding: Encoding) -> bool:
+    """Whether no other version of the type has another size.
+
+    A mutable part may have members more or less, and so may an appendable one in XCDR2.
+    """
+    match type_:
+        case Primitive() | EnumType() | BitmaskType() | BitsetType():
+            return True
+        case ArrayType():
+            return _is_rigid(type_.element, encoding)
+        case StructType():
+            is_closed = type_.extensibility is Extensibility.FINAL
+            is_closed |= type_.extensibility is Extensibility.APPENDABLE and not encoding.is_xcdr2
+            return is_closed and all(_is_rigid(member.type, encoding) for member in type_.members)
+        case _:
+            return False
 
 
 class _CanonicalWriter:

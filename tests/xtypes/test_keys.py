@@ -212,3 +212,66 @@ def test_what_is_no_key_has_its_default_in_a_sample_made_from_a_key() -> None:
     sample = type_support(Defaults).sample_from_key(b"\0\0\0\7")
     assert sample == Defaults(7, Fixed(0, 0.0))
     assert type_support(Defaults).sample_from_key(b"\0\0\0\7").inner is not sample.inner
+
+
+@idl.struct(typename="Part")
+class ShortPart:
+    a: idl.int32
+
+
+@idl.struct(typename="Part")
+class LongPart:
+    a: idl.int32
+    b: idl.int32
+
+
+@idl.struct(typename="Loose", extensibility=idl.MUTABLE)
+class ShortLoose:
+    a: Annotated[idl.int32, idl.id(1)]
+
+
+@idl.struct(typename="Loose", extensibility=idl.MUTABLE)
+class LongLoose:
+    b: Annotated[idl.int32, idl.id(2)]
+    a: Annotated[idl.int32, idl.id(1)]
+
+
+@idl.struct(extensibility=idl.FINAL)
+class OfShort:
+    part: ShortPart
+    parts: Annotated[idl.sequence[ShortPart], idl.array(2)]
+    loose: ShortLoose
+    key: Annotated[idl.int32, idl.key]
+
+
+@idl.struct(extensibility=idl.FINAL)
+class OfLong:
+    part: LongPart
+    parts: Annotated[idl.sequence[LongPart], idl.array(2)]
+    loose: LongLoose
+    key: Annotated[idl.int32, idl.key]
+
+
+@pytest.mark.parametrize("little_endian", [True, False])
+def test_the_key_is_found_behind_what_has_grown(little_endian: bool) -> None:
+    """All sizes in a type may be fixed; those in another version of it are others."""
+    short = OfShort(ShortPart(1), [ShortPart(2), ShortPart(3)], ShortLoose(4), 5)
+    long = OfLong(LongPart(1, 9), [LongPart(2, 9), LongPart(3, 9)], LongLoose(9, 4), 5)
+    for sample, reader in ((short, OfLong), (long, OfShort)):
+        octets = type_support(sample.__class__).serializer(DataRepresentationId.XCDR2, little_endian)(sample)
+        assert type_support(reader).key_from_payload(octets) == b"\0\0\0\5"
+
+
+def test_the_key_is_found_behind_a_parameter_list_that_has_grown() -> None:
+    @idl.struct(extensibility=idl.FINAL)
+    class Before:
+        loose: ShortLoose
+        key: Annotated[idl.int32, idl.key]
+
+    @idl.struct(extensibility=idl.FINAL)
+    class After:
+        loose: LongLoose
+        key: Annotated[idl.int32, idl.key]
+
+    octets = type_support(After).serializer(DataRepresentationId.XCDR1)(After(LongLoose(9, 4), 5))
+    assert type_support(Before).key_from_payload(octets) == b"\0\0\0\5"
