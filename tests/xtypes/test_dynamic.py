@@ -126,7 +126,7 @@ def test_samples_are_like_those_of_any_other_class() -> None:
 def test_limits_and_what_becomes_of_unfit_values_are_known() -> None:
     m: Any = idl.loads(EVERYTHING).m
     dynamic = ddsi.dynamic_type(received(m.Noted))
-    with pytest.raises(ddsi.BadParameter, match="speed: 10[.]0 is beyond its range"):
+    with pytest.raises(ddsi.BadParameter, match=r"speed: .* is beyond its range"):
         ddsi.serialize(dynamic(10.0, "", [[0, 0]] * 3, [1]))
 
     @idl.struct(typename="m::Noted", extensibility=idl.FINAL)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from ...structure.dataclass import dataclass
 from ...structure.errors import BadParameter
 from ..components import strongly_connected
-from ..idl_compiler.python_names import literal_name_in_idl
+from ..idl_compiler.python_identifiers import literal_name_in_idl
 from ..model import (
     ArrayType,
     BitmaskType,
