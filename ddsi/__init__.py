@@ -53,6 +53,7 @@ from .structure.builtin_topic_data import (
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
     SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
 )
 from .structure.errors import (
     AlreadyDeleted,
@@ -254,6 +255,7 @@ __all__ = [
     "Time",
     "TimeBasedFilter",
     "Topic",
+    "TopicBuiltinTopicData",
     "TopicData",
     "Transient",
     "TransientLocal",

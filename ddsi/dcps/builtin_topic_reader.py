@@ -9,6 +9,7 @@ from ..structure.builtin_topic_data import (
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
     SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
 )
 from ..structure.cache_change import CacheChange
 from ..structure.errors import BadParameter
@@ -22,25 +23,37 @@ if TYPE_CHECKING:
 
 __all__ = ["BuiltinTopicReader"]
 
-_KINDS = (ParticipantBuiltinTopicData, PublicationBuiltinTopicData, SubscriptionBuiltinTopicData)
+_KINDS = (
+    ParticipantBuiltinTopicData,
+    TopicBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
+)
 
-T = TypeVar("T", ParticipantBuiltinTopicData, PublicationBuiltinTopicData, SubscriptionBuiltinTopicData)
+T = TypeVar(
+    "T",
+    ParticipantBuiltinTopicData,
+    TopicBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
+)
 
 
 class BuiltinTopicReader(SampleReader[T]):
-    """Reads of remote participants, writers or readers: ``async for``, ``take`` and ``read`` as of any reader.
+    """Reads of remote participants, topics, writers or readers: ``async for``, ``take`` and ``read`` as of any reader.
 
     Each entity is an instance whose handle is its Guid.  One sample comes when it becomes known (to a reader that is
     made late, all that are known already), and one whenever it changes.  Its end is a sample without valid data, which
     still holds what was known last: NOT_ALIVE_DISPOSED when its participant said so, NOT_ALIVE_NO_WRITERS when it was
     lost (its lease ran out, its participant went, or security refuses it by now).
 
-    ``info.publication_handle`` is the participant that announced it.  Not shown: what belongs to the reader's own
+    ``info.publication_handle`` is the participant that announced it; topics, which nobody announces, are gathered from
+    the endpoints by the reader's own.  Not shown: what belongs to the reader's own
     participant, which the application made itself (DDS 1.4 §2.2.5), and whom security has not admitted.
     """
 
     def __init__(self, participant: DomainParticipant, kind: type[T]) -> None:
-        """``kind``: ParticipantBuiltinTopicData, PublicationBuiltinTopicData or SubscriptionBuiltinTopicData.
+        """``kind``: ParticipantBuiltinTopicData, or Topic..., Publication... or SubscriptionBuiltinTopicData.
 
         Raises BadParameter, AlreadyDeleted.
         """

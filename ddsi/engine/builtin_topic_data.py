@@ -5,15 +5,24 @@ DDS 1.4 §2.2.5, DDS-Security 1.1 §7.4.1.4 to §7.4.1.8.  For our own entities 
 
 from __future__ import annotations
 
+from hashlib import md5
+
 from ..spi import SecurityHooks
 from ..structure.builtin_topic_data import (
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
     SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
 )
-from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
+from ..structure.discovered import (
+    DiscoveredEndpointData,
+    DiscoveredParticipantData,
+    DiscoveredReaderData,
+    DiscoveredWriterData,
+)
+from ..structure.guid import Guid
 
-__all__ = ["participant_data", "publication_data", "subscription_data"]
+__all__ = ["participant_data", "publication_data", "subscription_data", "topic_data"]
 
 
 def participant_data(announced: DiscoveredParticipantData, hooks: SecurityHooks) -> ParticipantBuiltinTopicData:
@@ -28,6 +37,18 @@ def participant_data(announced: DiscoveredParticipantData, hooks: SecurityHooks)
         lease_duration=announced.lease_duration,
         properties=announced.properties,
         security=hooks.participant_security(announced.guid),
+    )
+
+
+def topic_data(announced: DiscoveredEndpointData) -> TopicBuiltinTopicData:
+    """The data of DCPSTopic, as far as one of its endpoints tells."""
+    names = f"{announced.topic_name}\0{announced.type_name}".encode()
+    return TopicBuiltinTopicData(
+        key=Guid(md5(names, usedforsecurity=False).digest()),
+        name=announced.topic_name,
+        type_name=announced.type_name,
+        qos=announced.qos,
+        type_information=announced.type_information,
     )
 
 

@@ -1,4 +1,4 @@
-"""BuiltinTopicReaders: the application's readers of DCPSParticipant, DCPSPublication and DCPSSubscription.
+"""BuiltinTopicReaders: the application's readers of DCPSParticipant, DCPSTopic, DCPSPublication and DCPSSubscription.
 
 DDS 1.4 §2.2.5 (Built-in Topics).  What discovery learns goes into their caches as changes, one instance for each
 entity; from there on they are read as all readers are.  Reliable, transient-local, KEEP_LAST 1, as the specification
@@ -6,7 +6,8 @@ wants it: a reader that comes late sees all that is known.  Entities of the part
 specification takes it that whoever made them knows of them.
 
 An instance that its participant said goodbye for is disposed; one that ended otherwise (a lease that ran out, an
-endpoint whose participant went, whom security refuses by now) has no writers any more.
+endpoint whose participant went, whom security refuses by now) has no writers any more.  A topic ends with the last of
+the endpoints that it is known by.
 
 Participants come here once they are admitted, and endpoints are announced by admitted participants alone.  As long as
 there is no such reader nothing is made and nothing is kept.  Strangers may come and go as often as they like: of those
@@ -24,6 +25,7 @@ from ..structure.builtin_topic_data import (
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
     SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
 )
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.dataclass import dataclass
@@ -33,7 +35,7 @@ from ..structure.qos import EndpointQos
 from ..structure.qos_policies import KeepLast, Reliable, TransientLocal
 from ..structure.time import TICKS_PER_SECOND
 from ..trace.reasons import LossReason
-from .builtin_topic_data import participant_data, publication_data, subscription_data
+from .builtin_topic_data import participant_data, publication_data, subscription_data, topic_data
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -56,8 +58,10 @@ class BuiltinTopicChange(CacheChange):
 
     __slots__ = ("data",)
 
-    def __init__(self, kind: ChangeKind, data: BuiltinTopicData, sequence_number: int, source_timestamp: int) -> None:
-        super().__init__(kind, data.key.participant, sequence_number, b"", data.key, source_timestamp)
+    def __init__(
+        self, kind: ChangeKind, announcer: Guid, data: BuiltinTopicData, sequence_number: int, source_timestamp: int
+    ) -> None:
+        super().__init__(kind, announcer, sequence_number, b"", data.key, source_timestamp)
         self.data = data
 
 
@@ -114,19 +118,40 @@ class BuiltinTopicReaders:
         has_said_so = reason is LossReason.GOODBYE
         kind = ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED if has_said_so else ChangeKind.NOT_ALIVE_UNREGISTERED
         for reader in self._readers.values():
-            data = reader.known.pop(guid, None)
-            if data is not None:
-                self._add(reader, kind, data, now)
-                reader.ended[guid] = None
-                if len(reader.ended) > _MAX_ENDED:
-                    oldest = next(iter(reader.ended))
-                    del reader.ended[oldest]
-                    reader.history.take(instance=oldest)
+            if reader.kind is TopicBuiltinTopicData:
+                for key in [key for key, data in reader.known.items() if not self._is_used(data)]:
+                    self._end(reader, kind, key, now)
+            elif guid in reader.known:
+                self._end(reader, kind, guid, now)
+
+    def _is_used(self, topic: BuiltinTopicData) -> bool:
+        """Does anybody write or read it?"""
+        assert isinstance(topic, TopicBuiltinTopicData)
+        engine = self._engine
+        return any(
+            endpoint.type_name == topic.type_name
+            for known in (engine.known_writers, engine.known_readers)
+            for endpoint in known.of_topic(topic.name)
+        )
+
+    def _end(self, reader: LocalBuiltinTopicReader, kind: ChangeKind, key: Guid, now: float) -> None:
+        self._add(reader, kind, reader.known.pop(key), now)
+        reader.ended[key] = None
+        if len(reader.ended) > _MAX_ENDED:
+            oldest = next(iter(reader.ended))
+            del reader.ended[oldest]
+            reader.history.take(instance=oldest)
 
     def _report(self, reader: LocalBuiltinTopicReader, announced: Announced, now: float) -> None:
-        if _KIND_OF[type(announced)] is not reader.kind:
+        data: BuiltinTopicData
+        if reader.kind is TopicBuiltinTopicData and not isinstance(announced, DiscoveredParticipantData):
+            data = topic_data(announced)
+            if data.key in reader.known:
+                return
+        elif _KIND_OF[type(announced)] is reader.kind:
+            data = self._data(announced)
+        else:
             return
-        data = self._data(announced)
         if reader.known.get(data.key) != data:
             reader.known[data.key] = data
             reader.ended.pop(data.key, None)
@@ -144,5 +169,8 @@ class BuiltinTopicReaders:
 
     def _add(self, reader: LocalBuiltinTopicReader, kind: ChangeKind, data: BuiltinTopicData, now: float) -> None:
         reader.last_sn += 1
-        is_taken = reader.history.add(BuiltinTopicChange(kind, data, reader.last_sn, self._engine.wall_ticks()), now)
+        # That there is a topic nobody announces: we have found it out.
+        announcer = self._engine.guid if isinstance(data, TopicBuiltinTopicData) else data.key.participant
+        change = BuiltinTopicChange(kind, announcer, data, reader.last_sn, self._engine.wall_ticks())
+        is_taken = reader.history.add(change, now)
         assert is_taken, "there is room for as many as the tables of discovery hold"

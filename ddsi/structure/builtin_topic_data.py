@@ -1,4 +1,4 @@
-"""What applications read of the builtin topics DCPSParticipant, DCPSPublication and DCPSSubscription.
+"""What applications read of the builtin topics DCPSParticipant, DCPSTopic, DCPSPublication and DCPSSubscription.
 
 DDS 1.4 §2.2.5 (Built-in Topics), with what DDS-Security 1.1 §7.4.1.4 to §7.4.1.8 adds to them.  Values only: they say
 who is there.  Where an entity lives, and what else SPDP and SEDP say for the protocol's own use, is in ``discovered``.
@@ -21,6 +21,7 @@ __all__ = [
     "ParticipantBuiltinTopicData",
     "PublicationBuiltinTopicData",
     "SubscriptionBuiltinTopicData",
+    "TopicBuiltinTopicData",
 ]
 
 
@@ -102,4 +103,23 @@ class SubscriptionBuiltinTopicData(_EndpointBuiltinTopicData):
     content_filter: ContentFilterProperty | None
 
 
-BuiltinTopicData = ParticipantBuiltinTopicData | PublicationBuiltinTopicData | SubscriptionBuiltinTopicData
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicBuiltinTopicData:
+    """A topic that somebody writes or reads.  ``key``: made from its name and that of its type.
+
+    Gathered from the announcements of writers and readers, as few stacks announce topics: ``qos`` and
+    ``type_information`` are those of the endpoint by which it became known.
+    """
+
+    TOPIC_NAME: ClassVar[str] = "DCPSTopic"
+
+    key: Guid
+    name: str
+    type_name: str
+    qos: EndpointQos
+    type_information: bytes
+
+
+BuiltinTopicData = (
+    ParticipantBuiltinTopicData | TopicBuiltinTopicData | PublicationBuiltinTopicData | SubscriptionBuiltinTopicData
+)

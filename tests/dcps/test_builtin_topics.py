@@ -138,12 +138,34 @@ async def test_a_closed_one_is_told_nothing_more(domain: int) -> None:
 
 
 @in_trio
-async def test_it_reads_three_kinds_and_says_so(domain: int) -> None:
+async def test_it_reads_four_kinds_and_says_so(domain: int) -> None:
     async with ddsi.DomainParticipant(domain) as participant:
-        with pytest.raises(ddsi.BadParameter, match="ParticipantBuiltinTopicData, PublicationBuiltinTopicData"):
+        with pytest.raises(ddsi.BadParameter, match="ParticipantBuiltinTopicData, TopicBuiltinTopicData, Publication"):
             ddsi.BuiltinTopicReader(participant, Shape)  # type: ignore[type-var]
         publications = ddsi.BuiltinTopicReader(participant, ddsi.PublicationBuiltinTopicData)
         assert repr(publications) == "<BuiltinTopicReader of DCPSPublication, 0 samples>"
+
+
+@in_trio
+async def test_a_topic_lasts_as_long_as_the_endpoints_that_it_is_known_by(domain: int) -> None:
+    async with pair(domain, writer=QOS, reader=QOS) as p:
+        topics = ddsi.BuiltinTopicReader(p.there, ddsi.TopicBuiltinTopicData)
+        (square,) = topics.take()
+        assert (square.data.name, square.data.type_name) == ("Square", "Shape")
+        assert square.data.qos.partition == PARTITION
+        other = ddsi.DataWriter(p.here, ddsi.Topic(p.here, "Square", Shape))
+        note = ddsi.DataWriter(p.here, ddsi.Topic(p.here, "Notes", Note))
+        assert (await anext(topics)).data.name == "Notes", "the second writer makes no second topic"
+        p.writer.close()
+        note.close()
+        end = await anext(topics)
+        assert (end.data.name, end.info.instance_state) == ("Notes", DISPOSED)
+        other.close()
+        end = await anext(topics)
+        assert (end.info.instance_handle, end.info.instance_state) == (square.data.key, DISPOSED)
+        ddsi.DataWriter(p.here, ddsi.Topic(p.here, "Square", Shape))
+        again = await anext(topics)
+        assert (again.data.key, again.info.instance_state) == (square.data.key, ALIVE)
 
 
 # --- what is behind a handle ----------------------------------------------------------------------------------------
