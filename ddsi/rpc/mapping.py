@@ -7,6 +7,7 @@ no place for a remote exception.  Not here: mapping of interfaces to such types.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from enum import Enum
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -15,7 +16,7 @@ from ..structure.guid import Guid
 from ..xtypes import idl
 from ..xtypes.defaults import zero_value
 from ..xtypes.definition import struct_type
-from ..xtypes.type_support import type_support
+from ..xtypes.unions import union_type
 from .correlation import CorrelatedSample, Identity
 from .identity import RemoteError, RemoteExceptionCode, ReplyHeader, RequestHeader, SampleIdentity
 
@@ -68,9 +69,12 @@ class Wire(Protocol[Req, Rep]):
 
 
 def wire(mapping: Mapping, name: str, request_type: type[Req], reply_type: type[Rep]) -> Wire[Req, Rep]:
-    """Raises BadParameter when one of the types cannot be a topic's."""
+    """Raises BadParameter when one of the types is neither an IDL struct nor union."""
     for type_ in (request_type, reply_type):
-        type_support(type_)
+        with suppress(BadParameter):
+            union_type(type_)
+            continue
+        struct_type(type_)
     if mapping is Mapping.ENHANCED:
         return _Enhanced(request_type, reply_type)
     if mapping is Mapping.BASIC:
