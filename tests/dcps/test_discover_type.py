@@ -5,24 +5,15 @@ from __future__ import annotations
 import pytest
 
 import ddsi
-from ddsi.xtypes.type_object import BuiltTypes
 
 from .running import Note, Shape, domain, in_trio, pair
 
 __all__ = ["domain"]
 
 
-def tell(participant: ddsi.DomainParticipant, types: BuiltTypes) -> None:
-    """As if a peer had answered already."""
-    assert participant._pump is not None
-    for identifier, octets in types.octets.items():
-        participant._pump.engine.types.registry.add(b"", identifier, octets)
-
-
 @in_trio
 async def test_a_discovered_type_reads_what_its_author_writes(domain: int) -> None:
     async with pair(domain, kind=Shape, announce_types=True) as both:
-        tell(both.there, ddsi.type_objects(Shape))
         dynamic = await both.there.discover_type("Square")
         assert dynamic is not Shape
         assert await both.there.discover_type("Square") is dynamic
