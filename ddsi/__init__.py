@@ -14,6 +14,7 @@ General layout, top to bottom; a room imports only rooms above it, never this pa
     discovery      SPDP, SEDP, matching                                                 RTPS 8.5
     engine         the participant as one machine without I/O
     transport      sockets, clock, trio                  simulation   the same engine over a virtual network
+    storage        samples that outlive a process, in SQLite
     dcps           what applications hold                                               DDS 1.4
     portal         the engine in a thread of its own; blocking, aio: its faces for scripts and for asyncio
     rpc            request and reply                                                    DDS-RPC 1.0
