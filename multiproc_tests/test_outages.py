@@ -60,6 +60,9 @@ OUTAGES = (
 )
 PARTNERS = (OURS, CYCLONE_C, FAST_DDS)
 SECURED = ("cable-pulled", "publisher-stopped")
+_NO_SECOND_HANDSHAKE = (
+    "Fast DDS 2.9.1 does not notice that it stood still, and answers no second handshake; to itself neither"
+)
 
 
 def _pairs(outage: Outage, *, plays_all: bool) -> Iterator[tuple[Peer, Peer]]:
@@ -77,10 +80,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     is_secured = metafunc.function is test_outage_of_a_secured_pair
     chosen = [
         pytest.param(
-            outage,
-            *pair,
-            id=f"{outage.name}-{pair[0]}-{pair[1]}",
-            marks=[pytest.mark.peers] if set(pair) & set(FOREIGN) else [],
+            outage, *pair, id=f"{outage.name}-{pair[0]}-{pair[1]}", marks=_marks(outage, pair, is_secured=is_secured)
         )
         for outage in OUTAGES
         if not is_secured or plays_all or outage.name in SECURED
@@ -88,6 +88,15 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         if not is_secured or plays_all or pair == (OURS, OURS)
     ]
     metafunc.parametrize(("outage", "publisher", "subscriber"), chosen)
+
+
+def _marks(outage: Outage, pair: tuple[Peer, Peer], *, is_secured: bool) -> list[pytest.MarkDecorator]:
+    marks = [pytest.mark.peers] if set(pair) & set(FOREIGN) else []
+    publisher, subscriber = pair
+    stopped = {"publisher-stopped": publisher, "subscriber-stopped": subscriber}.get(outage.name)
+    if is_secured and stopped is FAST_DDS:
+        marks.append(pytest.mark.xfail(reason=_NO_SECOND_HANDSHAKE))
+    return marks
 
 
 @async_test

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Matchmaker"]
 
+_MAY_RETURN = (LossReason.LEASE_EXPIRED, LossReason.RESTARTED)
+"""Its writers may be the same as before, and tell what they keep once more: who authenticated anew need not have died."""
+
 
 class Matchmaker:
     """``refusals``: for each (local, remote) pair of one topic that does not match, the reason."""
@@ -307,7 +310,7 @@ class Matchmaker:
     def unmatch_writer(self, reader: LocalReader, guid: Guid, reason: LossReason, now: float) -> None:
         engine = self._engine
         proxy = reader.behavior.writers.get(guid)
-        self.detach_writer(reader, guid, now, may_return=reason is LossReason.LEASE_EXPIRED)
+        self.detach_writer(reader, guid, now, may_return=reason in _MAY_RETURN)
         engine.hooks.unmatch(reader.guid, guid)
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:

@@ -192,9 +192,7 @@ def test_rtis_builtin_profiles_are_what_their_names_say_of_policies(written: Wri
 def test_builtin_profiles_of_another_meaning_are_refused_above_all_those_of_security(written: Written) -> None:
     """Read as nothing, a participant that was to be secured would be none."""
     for name in ("BuiltinQosSnippetLib::Feature.Security.Enable", "BuiltinQosLib::Generic.Security"):
-        with pytest.raises(
-            ddsi.ConfigurationError, match=f"line 9: .*'{name}', which is built into RTI"
-        ):
+        with pytest.raises(ddsi.ConfigurationError, match=f"line 9: .*'{name}', which is built into RTI"):
             written(BUILTIN.format(name))
     own = "<qos_library name='BuiltinQosLib'><qos_profile name='Generic.Security'/></qos_library>"
     written(BUILTIN.format("BuiltinQosLib::Generic.Security").replace("<dds>", f"<dds>{own}"))
