@@ -20,10 +20,14 @@ Octets = bytes | bytearray | memoryview
 
 @dataclass(frozen=True, slots=True)
 class SendDatagram:
-    """Send these parts, joined, to each of the locators.  The parts must not be kept: later writes may change them."""
+    """Send these parts, joined, to each of the locators.  The parts must not be kept: later writes may change them.
+
+    ``priority``: TRANSPORT_PRIORITY of the writer (DDS 1.4 §2.2.3.15), as far as it says more than the default.
+    """
 
     destinations: tuple[Locator, ...]
     parts: Sequence[Octets]
+    priority: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,7 @@ class Outbound:
         self._emit = emit
         self._dirty_writers: dict[Guid, LocalWriter] = {}
         # Messages to one participant, by sending entity, prefix and locators.
-        self._directed: dict[tuple[bytes, bytes, tuple[Locator, ...]], tuple[MessagePacker, Guid]] = {}
+        self._directed: dict[tuple[bytes, bytes, tuple[Locator, ...]], tuple[MessagePacker, Guid, int]] = {}
 
     def new_packer(self) -> MessagePacker:
         """For a writer's messages to all its readers, of whom there is none yet: see :meth:`receivers_changed`."""
@@ -214,7 +214,8 @@ class Outbound:
                 self._append_to_group(writer, parts, ticks)
         elif reader.locators:
             parts = self._hooks.encode_submessage(writer.guid, (reader.guid,), parts)
-            self._append_directed(writer.guid, reader.guid, reader.locators, parts, ticks)
+            priority = writer.data.qos.transport_priority.value
+            self._append_directed(writer.guid, reader.guid, reader.locators, parts, ticks, priority)
 
     def _append_to_group(self, writer: LocalWriter, parts: Parts, ticks: int | None) -> None:
         """``ticks``: the sample's timestamp; None for what is no sample."""
@@ -249,7 +250,13 @@ class Outbound:
             self._append_directed(reader, writer.guid, writer.locators, parts, None)
 
     def _append_directed(
-        self, sender: Guid, receiver: Guid, locators: tuple[Locator, ...], parts: Parts, ticks: int | None
+        self,
+        sender: Guid,
+        receiver: Guid,
+        locators: tuple[Locator, ...],
+        parts: Parts,
+        ticks: int | None,
+        priority: int = 0,
     ) -> None:
         if not parts:
             return  # it must not leave
@@ -259,11 +266,11 @@ class Outbound:
         if held is None:
             capacity = self._max_message_octets - self._hooks.overhead(sender, (receiver,)).message
             packer = MessagePacker(self._header + InfoDestination(prefix).encode(), capacity)
-            held = self._directed[key] = (packer, receiver)
+            held = self._directed[key] = (packer, receiver, priority)
         packer = held[0]
         size = sum(map(len, parts))
         if not packer.fits(size + 12):
-            self._emit_message(packer, (receiver,), locators)
+            self._emit_message(packer, (receiver,), locators, priority)
         if ticks is not None and ticks != packer.timestamp:
             packer.add((fast.timestamp(ticks),), 12)
             packer.timestamp = ticks
@@ -285,8 +292,8 @@ class Outbound:
             self._dirty_writers.clear()
         if self._directed:
             directed, self._directed = self._directed, {}
-            for (_, _, locators), (packer, receiver) in directed.items():
-                self._emit_message(packer, (receiver,), locators)
+            for (_, _, locators), (packer, receiver, priority) in directed.items():
+                self._emit_message(packer, (receiver,), locators, priority)
 
     def _piggyback(self, writer: LocalWriter) -> None:
         """Only behind samples: a final HEARTBEAT right behind one that asks would take the question back (Fast DDS)."""
@@ -307,16 +314,19 @@ class Outbound:
         writer.packer.add(parts, size)
 
     def _emit_group(self, writer: LocalWriter) -> None:
-        self._emit_message(writer.packer, writer.receivers, writer.behavior.locators)
+        priority = writer.data.qos.transport_priority.value
+        self._emit_message(writer.packer, writer.receivers, writer.behavior.locators, priority)
 
-    def _emit_message(self, packer: MessagePacker, receivers: tuple[Guid, ...], locators: tuple[Locator, ...]) -> None:
+    def _emit_message(
+        self, packer: MessagePacker, receivers: tuple[Guid, ...], locators: tuple[Locator, ...], priority: int
+    ) -> None:
         if packer.is_empty:
             return
         parts: Parts = packer.take()
         if locators:
             parts = self._hooks.encode_message(receivers, parts)
             if parts:
-                self._emit(SendDatagram(locators, parts))
+                self._emit(SendDatagram(locators, parts, priority))
 
 
 def _key_payload(payload: Octets) -> Octets:

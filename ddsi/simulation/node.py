@@ -254,7 +254,7 @@ class Node:
         while effects := self.engine.drain_effects():
             for effect in effects:
                 match effect:
-                    case SendDatagram(destinations, parts):
+                    case SendDatagram(destinations=destinations, parts=parts):
                         self.network.send(self.port, destinations, b"".join(parts))
                     case StatusChanged(entity, status):
                         self.statuses.append((self.now, entity, status))

@@ -17,6 +17,7 @@ __all__ = [
     "allow_shared_port",
     "bind_address_for_group",
     "can_gather",
+    "can_mark",
     "enlarge_buffer",
     "list_interfaces",
     "open_network_events",
@@ -30,6 +31,8 @@ _BUFFER_WANTED = 4 << 20
 
 
 can_gather = hasattr(socket.socket, "sendmsg")
+can_mark = can_gather and sys.platform == "linux"
+"""Can a datagram be given a DSCP of its own?  (ip(7): IP_TOS as a control message.)"""
 """Can one datagram be sent from several buffers?  Not on Windows."""
 
 

@@ -279,7 +279,7 @@ class Pump:
 
     def _send_backlog_now(self) -> None:
         backlog = self._backlog
-        while backlog and self.transport.send(backlog[0][0].parts, backlog[0][1]):
+        while backlog and self._send_one(*backlog[0]):
             backlog.popleft()
 
     def follow_interfaces(self) -> None:
@@ -358,12 +358,17 @@ class Pump:
 
     def _send(self, effect: SendDatagram) -> None:
         for locator in effect.destinations:
-            if self._backlog or not self.transport.send(effect.parts, locator):
+            if self._backlog or not self._send_one(effect, locator):
                 if len(self._backlog) >= _MAX_BACKLOG:
                     self.dropped_at_send += 1
                     continue
                 self._backlog.append((replace(effect, parts=[b"".join(effect.parts)]), locator))
                 self._backlog_waiting.unpark_all()
+
+    def _send_one(self, effect: SendDatagram, locator: Locator) -> bool:
+        if effect.priority:
+            return self.transport.send_marked(effect.parts, locator, effect.priority)
+        return self.transport.send(effect.parts, locator)
 
     def _start_job(self, effect: Compute) -> None:
         if self._nursery is None:  # before `run` was scheduled for the first time

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from ddsi.engine import SendDatagram
 from ddsi.simulation import Domain, NodeReader, NodeWriter
+from ddsi.simulation.endpoints import payload_of
+from ddsi.structure.cache_change import ChangeKind
 from ddsi.structure.errors import ImmutablePolicy
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_changes import CHANGEABLE
@@ -125,9 +128,10 @@ def test_a_stricter_reader_and_a_slacker_writer_part_with_the_reason(local: bool
     reader.change(KEPT | Qos(deadline=Deadline(3)))
     domain.run(0.5)
     assert counts(writer, reader) == (0, 0)
-    (offered,) = writer.node.statuses_of(OfferedIncompatibleQos)
-    (requested,) = reader.node.statuses_of(RequestedIncompatibleQos)
-    assert offered.incompatibilities[0].policy == requested.incompatibilities[0].policy == "deadline"
+    assert writer.node.statuses_of(OfferedIncompatibleQos) == [writer.local.incompatible]
+    assert reader.node.statuses_of(RequestedIncompatibleQos) == [reader.local.incompatible]
+    for status in (writer.local.incompatible, reader.local.incompatible):
+        assert [reason.policy for reason in status.incompatibilities] == ["deadline"]
     writer.change(KEPT | Qos(deadline=Deadline(2)))
     domain.run(0.5)
     assert counts(writer, reader) == (1, 1)
@@ -268,3 +272,21 @@ def test_a_fixed_policy_is_refused_by_name_and_all_stays(fixed: Qos) -> None:
 
 def test_the_names_of_what_may_change_are_those_of_policies() -> None:
     assert set(Qos.__dataclass_fields__) > CHANGEABLE
+
+
+# --- transport priority --------------------------------------------------------------------------------------------
+
+
+def test_a_priority_marks_what_the_writer_sends_from_then_on() -> None:
+    _, writer, _ = matched(local=False)
+    engine = writer.node.engine
+
+    def priorities() -> set[int]:
+        """Of the datagrams that one sample is sent in."""
+        payload = payload_of(writer.guid, 1, 8)
+        engine.write(writer.local, ChangeKind.ALIVE, payload, payload[4:5], writer.node.now)
+        return {effect.priority for effect in engine.drain_effects() if isinstance(effect, SendDatagram)}
+
+    assert priorities() == {0}
+    writer.change(KEPT | Qos(transport_priority=TransportPriority(46)))
+    assert priorities() == {46}

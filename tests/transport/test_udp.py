@@ -15,7 +15,7 @@ import pytest
 from ddsi.config import Config
 from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.locator import Locator
-from ddsi.transport.platform import Interface, list_interfaces
+from ddsi.transport.platform import Interface, can_mark, list_interfaces
 from ddsi.transport.udp import UdpTransport, _choose
 
 LOOPBACK = Interface("lo", "127.0.0.1", "255.0.0.0", 65536, is_loopback=True)
@@ -377,3 +377,22 @@ def test_closing_closes_every_socket(domain: int) -> None:
     assert all(sock.fileno() == -1 for sock in sockets)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+
+
+# --- priority --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not can_mark, reason="this system cannot mark single datagrams")
+@pytest.mark.parametrize(("priority", "dscp"), [(0, 0), (-4, 0), (10, 10), (63, 63), (1000, 63)])
+def test_a_transport_priority_is_the_datagrams_dscp(domain: int, priority: int, dscp: int) -> None:
+    """DDS 1.4 §2.2.3.15, RFC 2474."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver, opened(domain) as transport:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_RECVTOS, 1)
+        locator = Locator.udp_v4("127.0.0.1", receiver.getsockname()[1])
+        assert transport.send_marked([b"two ", b"parts"], locator, priority)
+        octets, ancillary, _, _ = receiver.recvmsg(100, 100)
+        assert octets == b"two parts"
+        ((_, _, service),) = ancillary
+        assert service[0] >> 2 == dscp
