@@ -196,7 +196,7 @@ class CoherentSets:
         self._filtered.pop(writer, None)
         part = self._parts.get(writer)
         if part is not None:
-            part.spoil("its writer was gone before the end of its coherent set")
+            self._spoil(part, "its writer was gone before the end of its coherent set")
             self._give_up(part, None, now)
 
     # --- parts -------------------------------------------------------------------------------------------
@@ -213,8 +213,7 @@ class CoherentSets:
             return
         octets = len(change.payload) + OCTETS_BESIDE_PAYLOAD
         if self.octets + octets > self._max_octets:
-            self.octets -= part.octets
-            part.spoil(f"its coherent set holds more than {self._max_octets} octets")
+            self._spoil(part, f"its coherent set holds more than {self._max_octets} octets")
             part.lost_count += 1
             return
         part.changes.append(change)
@@ -229,9 +228,12 @@ class CoherentSets:
             and not part.flaw
             and not self._are_filtered(change.writer_guid, part.next_sn, number)
         ):
-            self.octets -= part.octets
-            part.spoil(f"number {part.next_sn} of its coherent set is missing")
+            self._spoil(part, f"number {part.next_sn} of its coherent set is missing")
         part.next_sn = number + 1
+
+    def _spoil(self, part: Part, flaw: str) -> None:
+        self.octets -= part.octets
+        part.spoil(flaw)
 
     def _are_filtered(self, writer: Guid, start: int, end: int) -> bool:
         """Are all numbers in [start, end) for others?"""
@@ -254,7 +256,7 @@ class CoherentSets:
             self._forget(part)
         ranges = self._filtered.get(end.writer_guid)
         if ranges is not None:
-            self._filtered[end.writer_guid] = [kept for kept in ranges if kept[1] > end.sequence_number]
+            self._filtered[end.writer_guid] = [kept for kept in ranges if kept[1] > next_sn]
         return True
 
     def _give_up(self, part: Part, end: CacheChange | None, now: float) -> None:

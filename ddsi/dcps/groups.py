@@ -107,16 +107,16 @@ class Publisher(_Group):
     def coherent_changes(self) -> Iterator[None]:
         """``with publisher.coherent_changes():`` what is written in the body is one set.
 
-        Where the body raises, the set is withdrawn: readers with coherent access never see any of it.
+        Where the body raises, or closes the publisher, readers with coherent access never see any of it.
         """
         self.begin_coherent_changes()
+        is_complete = False
         try:
             yield
-        except BaseException:
+            is_complete = True
+        finally:
             if not self._is_closed:
-                self._end_coherent_changes(is_complete=False)
-            raise
-        self.end_coherent_changes()
+                self._end_coherent_changes(is_complete=is_complete)
 
     def _end_coherent_changes(self, *, is_complete: bool) -> None:
         self._check_open()
