@@ -58,7 +58,7 @@ class EventStream(AsyncIterator[Status]):
     """``async for event in entity.events()``: the statuses of one entity as they change, until it is closed."""
 
     def __init__(self, entity: EntityPortal) -> None:
-        self._engine = entity._engine
+        self._engine = entity._running_engine()
         self._stream: dcps.EventStream = self._engine.run_now(entity._entity.events)
         self._next: list[Status] = []
 

@@ -103,7 +103,7 @@ class Listening:
         if not isinstance(listener, Listener):
             raise BadParameter(f"a listener is derived from ddsi.blocking.Listener, which {listener!r} is not")
         self._entity = entity
-        self._engine = entity._engine
+        self._engine = entity._running_engine()
         self._inner = entity._entity
         self._listener = listener
         self._is_stopped = False

@@ -64,6 +64,10 @@ class EntityPortal:
         """Change the policies that ``qos`` sets: see ``ddsi.Entity.set_qos``."""
         self._ask(partial(self._entity.set_qos, qos))
 
+    def _running_engine(self) -> EngineThread:
+        """The thread that it is in."""
+        return self._engine
+
     def _ask(self, function: Callable[[], S]) -> S:
         """What ``function``, which does not wait, says in the engine's thread."""
         return self._engine.run_now(function)
@@ -84,7 +88,7 @@ class EntityPortal:
         """End the entity; what it held is released at once, and peers are told.  Safe twice."""
         if not self._entity.is_closed:
             with suppress(AlreadyDeleted):  # it ends with its participant just now
-                self._engine.run_now(self._entity.close)
+                self._ask(self._entity.close)
 
 
 class ParticipantPortal(EntityPortal):

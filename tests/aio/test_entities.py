@@ -178,6 +178,21 @@ async def test_an_error_of_the_body_leaves_as_itself(domain: int) -> None:
 
 
 @in_asyncio
+async def test_a_participant_that_was_not_entered_says_so_and_can_be_closed(domain: int) -> None:
+    participant = aio.DomainParticipant(domain)
+    with pytest.raises(ddsi.PreconditionNotMet, match="enter it first"):
+        participant.events()
+    with pytest.raises(ddsi.PreconditionNotMet, match="enter it first"):
+        aio.GuardCondition(participant)
+    assert participant.status(ddsi.SecurityRevoked) == ddsi.SecurityRevoked()
+    participant.close()
+    participant.close()
+    assert participant.is_closed
+    with pytest.raises(ddsi.AlreadyDeleted):
+        await participant.__aenter__()
+
+
+@in_asyncio
 async def test_cancelling_the_body_closes_the_participant(domain: int) -> None:
     participants = []
 
