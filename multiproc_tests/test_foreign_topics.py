@@ -11,8 +11,10 @@ import pytest
 
 from ddsi import idl
 
-from .framework import Namespace, Process, Scenario, async_test, namespace, scenario
-from .peers.peer import ROOT, network_environment
+from .framework import Namespace, Process, Scenario, Unavailable, async_test, namespace, scenario
+from .peers.catalogue import CYCLONE_C, OURS
+from .peers.options import Options
+from .peers.peer import ROOT, Peer, network_environment
 
 pytestmark = [
     pytest.mark.peers,
@@ -166,3 +168,41 @@ async def test_a_peer_that_tells_no_type_is_read_with_the_users(tmp_path: Path) 
     assert any("announces no type information" in line for line in output(typeof))
     assert errors(alone)[-1].endswith("Give its type: --type FILE.idl::NAME")
     assert all(line.startswith('color: "BLUE", x: ') for line in output(told))
+
+
+@async_test
+async def test_a_secured_topic_is_shown_to_those_with_rights(tmp_path: Path) -> None:
+    """Everything is encrypted: one without an identity sees neither type nor samples."""
+    with namespace() as host:
+        async with scenario("secured", deadline=90) as stage:
+            create = [*DDSI, "keystore", "create", str(tmp_path / "keys"), "-d", str(DOMAIN), "--preset", "encrypt-all"]
+            made = await stage.start("keystore", [*create, "--identity", "alice", "--identity", "bob"])
+            await made.expect_exit(0, timeout=20)
+            alice, bob = (str(tmp_path / "keys" / "enclaves" / name) for name in ("alice", "bob"))
+            shapes = [*DDSI, "shapes", "pub", "-d", str(DOMAIN), "--rate", "10", "--secure", alice]
+            await stage.start("shapes", shapes, namespace=host, environment=network_environment(host.interface))
+            echo = await ddsi(stage, host, "echo", "Square", "-n", "2", "--secure", bob)
+            await echo.expect_exit(0, timeout=40)
+            typeof = await ddsi(stage, host, "typeof", "Square", "--time", "4", "--secure", bob)
+            stranger = await ddsi(stage, host, "typeof", "Square", "--time", "2")
+            await typeof.expect_exit(0, timeout=40)
+            await stranger.expect_exit(1, timeout=40)
+    assert all(line.startswith('color: "BLUE", x: ') for line in output(echo))
+    assert "struct ShapeType {" in output(typeof)
+    assert output(stranger)[0] == "// Nobody was seen with a writer or reader of Square."
+
+
+@pytest.mark.parametrize("peer", [CYCLONE_C, OURS], ids=str)
+@async_test
+async def test_every_vendor_that_tells_its_types_is_echoed(peer: Peer) -> None:
+    """Cyclone DDS 0.10 in C, and our own program; cyclonedds for Python has its own tests above."""
+    with namespace() as host:
+        async with scenario(f"echo {peer}", deadline=60) as stage:
+            options = Options(domain=DOMAIN, count=2, wait_s=40)
+            try:
+                await peer.start(stage, "pub", options, host=host)
+            except Unavailable as error:
+                pytest.skip(str(error))
+            echo = await ddsi(stage, host, "echo", "Square", "-n", "2")
+            await echo.expect_exit(0, timeout=40)
+    assert output(echo) == ['color: "BLUE", x: 0, y: 0, shapesize: 30', 'color: "BLUE", x: 1, y: 2, shapesize: 30']

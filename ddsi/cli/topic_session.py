@@ -35,7 +35,7 @@ from .exit_status import CommandError
 from .fitting_qos import common_partition
 from .tables import shown
 
-__all__ = ["TopicSession", "add_topic_arguments", "load_type"]
+__all__ = ["TopicSession", "add_security", "add_topic_arguments", "load_type", "participant_qos"]
 
 Peer = DiscoveredWriterData | DiscoveredReaderData
 
@@ -64,6 +64,10 @@ def add_topic_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-n", "--count", type=count, metavar="N", help="end after so many samples")
     parser.add_argument("--timeout", type=seconds, metavar="SECONDS", help="end after so long in all")
+    add_security(parser)
+
+
+def add_security(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--secure",
         type=Path,
@@ -78,6 +82,12 @@ def add_topic_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="a property of the participant, such as dds.sec.log.log_file=FILE; repeatable",
     )
+
+
+def participant_qos(arguments: argparse.Namespace, name: str) -> Qos:
+    """A participant under the command's name, secured where that was asked for."""
+    qos = Qos(entity_name=name, properties=dict(arguments.property))
+    return secure(arguments.secure) | qos if arguments.secure else qos
 
 
 def _property(text: str) -> tuple[str, str]:
@@ -127,14 +137,8 @@ class TopicSession:
         """A sentence on standard error."""
         print(f"{self.command}: {shown(self.topic)}: {text}", file=sys.stderr, flush=True)
 
-    @asynccontextmanager
-    async def participant(self) -> AsyncIterator[DomainParticipant]:
-        """A participant under the command's name, secured where that was asked for."""
-        qos = Qos(entity_name=self.command, properties=dict(self.arguments.property))
-        if self.arguments.secure:
-            qos = secure(self.arguments.secure) | qos
-        async with DomainParticipant(self.arguments.domain, qos=qos) as participant:
-            yield participant
+    def participant(self) -> DomainParticipant:
+        return DomainParticipant(self.arguments.domain, qos=participant_qos(self.arguments, self.command))
 
     # --- finding -----------------------------------------------------------------------------------------
 

@@ -24,9 +24,10 @@ from .arguments import add_domain, add_json, add_listening
 from .census import Census, SeenEndpoint, SeenParticipant, take_census
 from .census_tables import who
 from .exit_status import ExitStatus
-from .listening import listen, observer
+from .listening import listen
 from .runner import run as run_async
 from .tables import shown
+from .topic_session import add_security, participant_qos
 
 __all__ = ["SUMMARY", "add_arguments", "run"]
 
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_domain(parser)
     add_listening(parser)
     add_json(parser)
+    add_security(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -52,7 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _show(arguments: argparse.Namespace) -> int:
-    async with observer(arguments.domain, "ddsi typeof") as participant:
+    qos = participant_qos(arguments, "ddsi typeof")
+    async with DomainParticipant(arguments.domain, qos=qos) as participant:
         await listen(participant, arguments.time)
         found = announced_types(take_census(participant), arguments.topic)
         async with trio.open_nursery() as nursery:
