@@ -51,6 +51,12 @@ BUILTIN_SECURE_TOPICS: Final = (
         "BuiltinParticipantVolatileMessageSecureWriter",
         "BuiltinParticipantVolatileMessageSecureReader",
     ),
+    BuiltinSecureTopic(
+        "TypeLookupServiceRequestSecure", ids.TYPE_LOOKUP_REQUEST_SECURE_WRITER, ids.TYPE_LOOKUP_REQUEST_SECURE_READER
+    ),
+    BuiltinSecureTopic(
+        "TypeLookupServiceReplySecure", ids.TYPE_LOOKUP_REPLY_SECURE_WRITER, ids.TYPE_LOOKUP_REPLY_SECURE_READER
+    ),
 )
 
 SECURE_BUILTIN: Final = frozenset(

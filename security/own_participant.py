@@ -29,8 +29,9 @@ __all__ = ["OwnParticipant", "settled"]
 
 T = TypeVar("T")
 
-_SECURE_BUILTIN_ENDPOINTS: Final = BuiltinEndpoints(0x0FFF << 16)
-"""Bits 16 to 27: all of them, as others take a participant that announces fewer for an unsecured one (Cyclone DDS)."""
+_SECURE_BUILTIN_ENDPOINTS: Final = BuiltinEndpoints(0x0FFF << 16 | 0xF << 32)
+"""Bits 16 to 27: all of them, as others take a participant that announces fewer for an unsecured one (Cyclone DDS).
+And those of DDS-Security 1.2, for type lookup, which have a parameter of their own."""
 
 
 class OwnParticipant:

@@ -250,6 +250,45 @@ def type_objects() -> Iterator[Made]:
     yield "dependencies-beyond-the-end", b"\4" + framed(b"\1\x10\0\x40" + half), MALFORMED
 
 
+def type_lookups() -> Iterator[Made]:
+    """The first octet says which: 0 a question, 1 an answer."""
+    head = b"\0\7\0\0" + bytes(24)
+
+    def framed(body: bytes, length: int | None = None) -> bytes:
+        return struct.pack("<I", len(body) if length is None else length) + body
+
+    def question(members: bytes, operation: int = 0x018252D3) -> bytes:
+        return b"\0" + head + struct.pack("<I", 1) + bytes(4) + framed(struct.pack("<I", operation) + framed(members))
+
+    def answer(members: bytes) -> bytes:
+        return b"\1" + head + bytes(4) + framed(struct.pack("<I", 0x018252D3) + framed(bytes(4) + framed(members)))
+
+    ids, types, point = (struct.pack("<I", 5 << 28 | member) for member in (0x0C536065, 0x02804AD1, 0x0508E3D2))
+    yield "nothing", b"", MALFORMED
+    yield "question-of-nothing", question(b""), "accepted"
+    yield "question-of-no-operation", question(b"", 7), MALFORMED + " ~ operation"
+    yield "question-in-plain-cdr", b"\0\0\1\0\0" + bytes(60), MALFORMED + " ~ CDR_LE"
+    yield "identifiers-beyond-the-end", question(ids + framed(struct.pack("<I", 60_000) + bytes(99))), MALFORMED
+    yield "identifiers-of-4-gigabytes", question(ids + framed(U32_MAX, 0xFFFFFFFC)), MALFORMED
+    yield "identifiers-by-the-thousand", question(ids + framed(struct.pack("<I", 40_000) + b"\4" * 40_000)), "accepted"
+    yield "continuation-of-100-octets", question(point + framed(bytes(100))), MALFORMED + " ~ 100 octets"
+    yield "name-of-300-octets", b"\0" + head + framed(b"x" * 300 + b"\0"), MALFORMED + " ~ 300 characters"
+    yield "members-without-end", question(struct.pack("<I", 1 << 28) * 500), MALFORMED
+    hashed = b"\xf1" + bytes(15)
+    yield (
+        "a-type-that-is-another",
+        answer(types + framed(struct.pack("<I", 1) + hashed + framed(b"\xf1\x51" + bytes(42)))),
+        MALFORMED,
+    )
+    yield (
+        "a-type-longer-than-all",
+        answer(types + framed(struct.pack("<I", 1) + hashed + framed(b"", 0x7FFFFFFC))),
+        MALFORMED,
+    )
+    yield "types-beyond-the-end", answer(types + framed(struct.pack("<I", 65_536) + bytes(24))), MALFORMED
+    yield "an-exception", b"\1" + head + bytes([1, 0, 0, 0]), "accepted"
+
+
 MESSAGE_MAKERS: dict[str, Callable[[], Iterator[Made]]] = {
     "datagram": datagrams,
     "conversation": conversations,
@@ -259,4 +298,5 @@ MESSAGE_MAKERS: dict[str, Callable[[], Iterator[Made]]] = {
     "participant_message": participant_messages,
     "sample": samples,
     "type_object": type_objects,
+    "type_lookup": type_lookups,
 }

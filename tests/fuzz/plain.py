@@ -9,7 +9,9 @@ from itertools import islice
 from ddsi.config import Config
 from ddsi.discovery.parameters import decode_participant, decode_reader, decode_writer
 from ddsi.discovery.participant_message import ParticipantMessageData
+from ddsi.discovery.type_lookup import FoundTypes, decode_reply, decode_request, encode_reply, encode_request
 from ddsi.engine import Participant
+from ddsi.engine.type_registry import TypeRegistry
 from ddsi.messages.receiver import MessageReceiver
 from ddsi.messages.submessages import Data
 from ddsi.structure import builtin_entity_ids as ids
@@ -25,8 +27,14 @@ from ddsi.structure.qos import Qos, reader_qos, writer_qos
 from ddsi.structure.qos_policies import KeepAll, Reliable, TransientLocal
 from ddsi.structure.vendor import CYCLONE
 from ddsi.xtypes import type_support
-from ddsi.xtypes.type_object import decode_identifier, decode_type_information, decode_type_object
+from ddsi.xtypes.type_object import (
+    HashedIdentifier,
+    decode_identifier,
+    decode_type_information,
+    decode_type_object,
+)
 from tests.captures.capture import PLAIN, load
+from tests.discovery.test_type_lookup import REPLIES, REPLY, REQUEST, REQUESTS
 from tests.engine.wire import VENDOR, Stranger, engine
 from tests.fuzz.target import ACCEPTED, Target, verdict
 from tests.xtypes.type_object.vectors import VECTORS as TYPE_OBJECTS
@@ -188,6 +196,30 @@ def type_objects() -> Iterator[bytes]:
                 yield b"\2" + bytes.fromhex(octets)
 
 
+def type_lookup(octets: bytes) -> str:
+    """A question of the TypeLookup service, or with the first octet odd an answer, whose types are taken."""
+    if not octets or not octets[0] & 1:
+        return verdict(lambda: decode_request(octets[1:]), MalformedMessage)
+
+    def take() -> None:
+        reply = decode_reply(octets[1:])
+        for identifier, type_object in reply.result.types if isinstance(reply.result, FoundTypes) else ():
+            if isinstance(identifier, HashedIdentifier):
+                TypeRegistry().add(bytes(12), identifier, type_object)
+
+    return verdict(take, MalformedMessage)
+
+
+def lookups() -> Iterator[bytes]:
+    """Recorded ones, and what is never recorded: lists of dependencies."""
+    yield b"\0" + REQUEST
+    yield b"\1" + REPLY
+    for request in REQUESTS:
+        yield b"\0" + encode_request(request)
+    for reply in REPLIES:
+        yield b"\1" + encode_reply(reply)
+
+
 PLAIN_TARGETS = {
     "datagram": Target(datagram, captured_datagrams, 2048, enormous=60_000),
     "conversation": Target(conversation, conversations, 4096, enormous=60_000, good="dropped"),
@@ -197,4 +229,5 @@ PLAIN_TARGETS = {
     "participant_message": Target(participant_message, lambda: captured_payloads(ids.PARTICIPANT_MESSAGE_WRITER), 512),
     "sample": Target(sample, samples, 512),
     "type_object": Target(type_object, type_objects, 1024),
+    "type_lookup": Target(type_lookup, lookups, 1024),
 }

@@ -143,7 +143,7 @@ def test_the_guid_is_bound_to_the_subject() -> None:
 
 def test_all_secure_endpoints_are_announced() -> None:
     alice = Side("alice")
-    assert alice.data.builtin_endpoints == BuiltinEndpoints(0x0FFF0000)
+    assert alice.data.builtin_endpoints == BuiltinEndpoints(0xF_0FFF_0000)
     assert [pid for pid, _ in alice.data.security_parameters] == [0x1001, 0x1002, 0x1005]
 
 
