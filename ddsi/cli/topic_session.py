@@ -85,7 +85,7 @@ def add_security(parser: argparse.ArgumentParser) -> None:
 
 
 def participant_qos(arguments: argparse.Namespace, name: str) -> Qos:
-    """A participant under the command's name, secured where that was asked for."""
+    """That of a participant under the command's name, secured where that was asked for."""
     qos = Qos(entity_name=name, properties=dict(arguments.property))
     return secure(arguments.secure) | qos if arguments.secure else qos
 
