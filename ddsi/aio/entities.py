@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, Unpack
 from .. import dcps
 from ..config import Config
 from ..dcps.data_writer import Timestamp
+from ..dcps.type_access import AnnouncedEndpoint
 from ..portal.conditions import WaitSetPortal
 from ..portal.endpoints import InstanceSelection, ReaderPortal, SampleReaderPortal, Selection, WriterPortal
 from ..portal.entities import (
@@ -142,6 +143,10 @@ class DomainParticipant(_Async, ParticipantPortal):
     async def discover_type(self, topic_name: str, *, timeout: float | None = 10.0) -> type[Any]:
         """The type of a topic that others write or read: see ``ddsi.DomainParticipant.discover_type``."""
         return await self._engine.run_for_asyncio(self._inner.discover_type, topic_name, timeout=timeout)
+
+    async def endpoint_type(self, endpoint: AnnouncedEndpoint, *, timeout: float | None = 10.0) -> type[Any]:
+        """The type of one remote writer or reader, as a class: see ``ddsi.DomainParticipant.endpoint_type``."""
+        return await self._engine.run_for_asyncio(self._inner.endpoint_type, endpoint, timeout=timeout)
 
 
 class Topic(_Async, TopicPortal[T], Generic[T]):

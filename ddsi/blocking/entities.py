@@ -15,6 +15,7 @@ from .. import dcps
 from ..config import Config
 from ..dcps.data_writer import Timestamp
 from ..dcps.entity import deadline_scope
+from ..dcps.type_access import AnnouncedEndpoint
 from ..portal.conditions import WaitSetPortal
 from ..portal.endpoints import InstanceSelection, ReaderPortal, SampleReaderPortal, Selection, WriterPortal
 from ..portal.entities import (
@@ -160,6 +161,10 @@ class DomainParticipant(_Blocking, ParticipantPortal):
     def discover_type(self, topic_name: str, *, timeout: float | None = 10.0) -> type[Any]:
         """The type of a topic that others write or read: see ``ddsi.DomainParticipant.discover_type``."""
         return self._engine.run(self._inner.discover_type, topic_name, timeout=timeout)
+
+    def endpoint_type(self, endpoint: AnnouncedEndpoint, *, timeout: float | None = 10.0) -> type[Any]:
+        """The type of one remote writer or reader, as a class: see ``ddsi.DomainParticipant.endpoint_type``."""
+        return self._engine.run(self._inner.endpoint_type, endpoint, timeout=timeout)
 
 
 class Topic(_Blocking, TopicPortal[T], Generic[T]):

@@ -84,6 +84,18 @@ class WriterPortal(EntityPortal, Generic[T]):
         """Every policy as it holds for this writer, defaults filled in."""
         return self._inner.endpoint_qos
 
+    def register_instance(self, sample: T) -> bytes:
+        """Announce that the instance that ``sample`` belongs to will be written; returns its handle."""
+        return self._ask(partial(self._inner.register_instance, sample))
+
+    def lookup_instance(self, sample: T) -> bytes | None:
+        """The handle of the instance that ``sample`` belongs to; None if it is not registered here."""
+        return self._ask(partial(self._inner.lookup_instance, sample))
+
+    def get_key_value(self, handle: bytes) -> T:
+        """A sample with the key of a registered instance, the type's defaults elsewhere.  Raises BadParameter."""
+        return self._ask(partial(self._inner.get_key_value, handle))
+
     def matched_subscriptions(self) -> list[Guid]:
         """The Guids of the readers that are matched now."""
         return self._engine.run_now(self._inner.matched_subscriptions)
@@ -197,6 +209,10 @@ class ReaderPortal(SampleReaderPortal[T]):
     def lookup_instance(self, sample: T) -> bytes | None:
         """The handle of the instance that ``sample`` belongs to; None if the reader does not know it."""
         return self._engine.run_now(self._inner.lookup_instance, sample)
+
+    def get_key_value(self, handle: bytes) -> T:
+        """A sample with the key of a known instance, the type's defaults elsewhere.  Raises BadParameter."""
+        return self._ask(partial(self._inner.get_key_value, handle))
 
     def matched_publications(self) -> list[Guid]:
         """The Guids of the writers that are matched now."""

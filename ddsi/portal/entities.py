@@ -76,6 +76,15 @@ class EntityPortal:
     def is_closed(self) -> bool:
         return self._entity.is_closed
 
+    @property
+    def is_enabled(self) -> bool:
+        """Does it take part?"""
+        return self._entity.is_enabled
+
+    def enable(self) -> None:
+        """Let it take part, where EntityFactory had it wait: see ``ddsi.Entity.enable``."""
+        self._ask(self._entity.enable)
+
     def status(self, kind: type[S]) -> S:
         """The present value of one status: see ``ddsi.Entity.status``."""
         return self._ask(partial(self._entity.status, kind))
@@ -167,6 +176,30 @@ class ParticipantPortal(EntityPortal):
         """Act as if that participant were not there, from now on."""
         self._ask(partial(self._inner.ignore_participant, guid))
 
+    def ignore_publication(self, guid: Guid) -> None:
+        """Act as if that remote writer were not there, from now on."""
+        self._ask(partial(self._inner.ignore_publication, guid))
+
+    def ignore_subscription(self, guid: Guid) -> None:
+        """Act as if that remote reader were not there, from now on."""
+        self._ask(partial(self._inner.ignore_subscription, guid))
+
+    def ignore_topic(self, topic_name: str) -> None:
+        """Act as if no remote participant had writers or readers of that topic, from now on."""
+        self._ask(partial(self._inner.ignore_topic, topic_name))
+
+    def knows_all_announced(self) -> bool:
+        """Has every endpoint come that the participants known now had when they were discovered?"""
+        return self._ask(self._inner.knows_all_announced)
+
+    def contains_entity(self, handle: Guid) -> bool:
+        """Is this the Guid of an endpoint that belongs to it, or to a group of it?"""
+        return self._ask(partial(self._inner.contains_entity, handle))
+
+    def delete_contained_entities(self) -> None:
+        """Close all that was made with it; itself it stays open."""
+        self._ask(self._inner.delete_contained_entities)
+
     def assert_liveliness(self) -> None:
         """Say that all writers of manual-by-participant liveliness are alive."""
         self._ask(self._inner.assert_liveliness)
@@ -239,6 +272,14 @@ class FilteredTopicPortal(EntityPortal, Generic[T]):
         return self._topic
 
     @property
+    def type(self) -> type[T]:
+        return self._inner.type
+
+    @property
+    def type_name(self) -> str:
+        return self._inner.type_name
+
+    @property
     def filter_expression(self) -> str:
         return self._inner.filter_expression
 
@@ -258,6 +299,14 @@ class GroupPortal(EntityPortal):
         self._participant = participant
         self._inner = participant._ask(create)
         super().__init__(participant._engine, self._inner)
+
+    def contains_entity(self, handle: Guid) -> bool:
+        """Is this the Guid of an endpoint that belongs to it?"""
+        return self._ask(partial(self._inner.contains_entity, handle))
+
+    def delete_contained_entities(self) -> None:
+        """Close all that was made with it; itself it stays open."""
+        self._ask(self._inner.delete_contained_entities)
 
 
 class PublisherPortal(GroupPortal):

@@ -369,3 +369,33 @@ def test_coherent_sets_and_access_to_several_readers(domain: int) -> None:
             publisher.end_coherent_changes()
         with pytest.raises(ddsi.DdsTimeout, match="no samples in"):
             subscriber.wait(timeout=0.01)
+
+
+def test_instances_entities_and_what_is_ignored(domain: int) -> None:
+    late = ddsi.Qos(entity_factory=ddsi.EntityFactory(autoenable_created_entities=False))
+    with blocking.DomainParticipant(domain) as participant:
+        pair = Pair(participant)
+        handle = pair.writer.register_instance(Shape("BLUE"))
+        assert pair.writer.lookup_instance(Shape("BLUE")) == handle
+        assert pair.writer.get_key_value(handle) == Shape("BLUE")
+        pair.writer.write(Shape("BLUE", 3))
+        assert pair.reader.get_key_value(handle) == Shape("BLUE")
+        publisher = blocking.Publisher(participant, late)
+        writer = blocking.DataWriter(publisher, pair.topic, RELIABLE)
+        assert (publisher.is_enabled, writer.is_enabled) == (True, False)
+        writer.enable()
+        assert writer.is_enabled
+        assert publisher.contains_entity(writer.guid)
+        assert participant.contains_entity(writer.guid)
+        publisher.delete_contained_entities()
+        assert writer.is_closed
+        assert participant.knows_all_announced()
+        with blocking.DomainParticipant(domain) as other:
+            other.ignore_topic("Square")
+            other.ignore_publication(pair.writer.guid)
+            other.ignore_subscription(pair.reader.guid)
+            ignoring = blocking.DataReader(other, blocking.Topic(other, "Square", Shape), RELIABLE)
+            with pytest.raises(ddsi.DdsTimeout):
+                ignoring.wait_for_matched(timeout=0.2)
+        participant.delete_contained_entities()
+        assert pair.reader.is_closed
