@@ -13,6 +13,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 
 from ..structure.cache_change import CacheChange, ChangeKind
@@ -97,9 +98,12 @@ class StatefulWriter:
 
     # --- the application's side --------------------------------------------------------------------------
 
-    def qos_changed(self, qos: EndpointQos, now: float) -> None:
-        """Policies that may change have changed; DDS 1.4 §2.2.3.  What is in the history keeps its LIFESPAN."""
-        self.deadline = DeadlineWatch.anew(self.deadline, qos.deadline.period, self.cache.instances(), now)
+    def qos_changed(self, qos: EndpointQos, instances: Iterable[bytes], now: float) -> None:
+        """Policies that may change have changed; DDS 1.4 §2.2.3.  What is in the history keeps its LIFESPAN.
+
+        ``instances``: those of which a DEADLINE may now be expected, if none was before.
+        """
+        self.deadline = DeadlineWatch.anew(self.deadline, qos.deadline.period, instances, now)
         self.qos = qos
 
     @property

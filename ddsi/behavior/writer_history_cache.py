@@ -85,10 +85,6 @@ class WriterHistoryCache:
         """All that is here, ascending."""
         return list(self._changes.values())
 
-    def instances(self) -> list[bytes]:
-        """The keys of the instances that have a change here, where it keeps them apart."""
-        return list(self._by_instance)
-
     def lacks_room(self, key: bytes) -> str | None:
         """The limit that forbids one more change of this instance now, by name; None when there is room.
 

@@ -70,7 +70,8 @@ class DataWriter(Endpoint, Generic[T]):
         self._is_enabled = parent._enables_members
         self._key = support.key
         self._is_keyed = support.is_keyed
-        self._instances: dict[bytes, None] = {}  # that it has registered, by writing or in so many words
+        # What it has registered, by writing or in so many words; without key it is all one instance, b"".
+        self._instances: dict[bytes, None] = {}
         self._latest_ticks = 0
         self._progress = trio.lowlevel.ParkingLot()
         self._pump = participant._running_pump()
@@ -146,7 +147,7 @@ class DataWriter(Endpoint, Generic[T]):
             source_timestamp=None if timestamp is None and not self._is_by_source else self._source_ticks(timestamp),
             key_hash=self._key_hash(key) if self._hides_keys else b"",
         )  # fmt: skip
-        if key not in self._instances and self._is_keyed:
+        if key not in self._instances:
             self._instances[key] = None
         pump.written(now)
 
@@ -234,7 +235,11 @@ class DataWriter(Endpoint, Generic[T]):
         Where it does not, the end of the writer, which all readers hear of, says as much.
         """
         instances, self._instances = self._instances, {}
-        if not self._endpoint_qos.writer_data_lifecycle.autodispose_unregistered_instances or self._pump.is_closed:
+        if (
+            not self._is_keyed
+            or not self._endpoint_qos.writer_data_lifecycle.autodispose_unregistered_instances
+            or self._pump.is_closed
+        ):
             return
         now = self._pump.now()
         for key in instances:
@@ -350,7 +355,8 @@ class DataWriter(Endpoint, Generic[T]):
         return self._writer
 
     def _follow(self, plan: QosPlan) -> None:
-        self._pump.engine.qos_changes.change_writer(self._writer, plan.resolved, self._pump.now())
+        engine, now = self._pump.engine, self._pump.now()
+        engine.qos_changes.change_writer(self._writer, plan.resolved, now, self._instances)
         super()._follow(plan)
         self._pump.settle()
 

@@ -7,6 +7,7 @@ judged again as if one of the two had just appeared, and timers follow.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -32,15 +33,18 @@ class QosChanges:
         check_changeable(data.qos, qos, f"{endpoint.KIND} of {data.topic_name!r}")
         self._engine.hooks.local_endpoint_changed(replace(data, qos=qos))
 
-    def change_writer(self, writer: LocalWriter, qos: EndpointQos, now: float) -> None:
-        """Raises ImmutablePolicy, NotAllowedBySecurity; then nothing has changed."""
+    def change_writer(self, writer: LocalWriter, qos: EndpointQos, now: float, instances: Iterable[bytes] = ()) -> None:
+        """``instances``: those that it has registered, of which a DEADLINE may now be expected.
+
+        Raises ImmutablePolicy, NotAllowedBySecurity; then nothing has changed.
+        """
         if qos == writer.data.qos:
             return
         self.check(writer, qos)
         engine = self._engine
         engine.now = now
         writer.data = replace(writer.data, qos=qos)
-        writer.behavior.qos_changed(qos, now)
+        writer.behavior.qos_changed(qos, instances, now)
         engine.discovery.announce_writer(writer, now)
         engine.matchmaker.writer_appeared(writer, now)
         engine.writer_answers(writer, ())

@@ -97,7 +97,8 @@ class NodeWriter:
 
     def change(self, qos: Qos) -> None:
         """Change policies: what ``qos`` does not set becomes the default.  Raises as applications are refused."""
-        self.node.engine.qos_changes.change_writer(self.local, writer_qos(qos), self.node.now)
+        keys = dict.fromkeys(change.key for change in self.written.values())
+        self.node.engine.qos_changes.change_writer(self.local, writer_qos(qos), self.node.now, keys)
         self.node.pump()
 
     def delete(self) -> None:
