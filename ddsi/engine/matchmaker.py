@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Matchmaker"]
 
 _MAY_RETURN = (LossReason.LEASE_EXPIRED, LossReason.RESTARTED)
-"""Its writers may be the same as before, and tell what they keep once more: who authenticated anew need not have died."""
+"""Its writers may be the same as before, and repeat what they keep: who authenticated anew need not have died."""
 
 
 class Matchmaker:
