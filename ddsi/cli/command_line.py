@@ -26,6 +26,7 @@ _COMMANDS = {
     "shapes": "publish or subscribe the shapes of the OMG's demo, drawn in the terminal",
     "trace": "watch or record what goes over the wire, or draw a recording",
     "sim": "run a scenario over a simulated network, from a seed",
+    "persist": "keep what transient and persistent writers write, for readers that come when they are gone",
     "idl": "make Python types from an IDL file",
     "demo": "show live data flowing between processes on this host",
     "doctor": "check interfaces, sockets, multicast, buffers and configuration",
