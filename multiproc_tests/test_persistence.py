@@ -1,4 +1,4 @@
-"""What was written survives its writer and the service that keeps it, both killed; late joiners of two vendors get it."""
+"""What was written survives its writer and the service that keeps it, both killed; late joiners get it."""
 
 from __future__ import annotations
 

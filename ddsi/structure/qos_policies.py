@@ -163,14 +163,14 @@ class TransientLocal:
 
 @dataclass(frozen=True, slots=True)
 class Transient:
-    """A service keeps the history beyond the writer's life.  Until there is one: as :class:`TransientLocal`."""
+    """A persistence service, if there is one, keeps the history beyond the writer's life."""
 
     KIND: ClassVar[int] = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Persistent:
-    """A service keeps the history beyond a restart.  Until there is one: as :class:`TransientLocal`."""
+    """A persistence service, if there is one, keeps the history beyond the writer's life and its own."""
 
     KIND: ClassVar[int] = 3
 

@@ -1,6 +1,6 @@
 """The same over the `cyclonedds` package of PyPI.
 
-    cyclonedds_durable pub|sub DOMAIN COUNT
+cyclonedds_durable pub|sub DOMAIN COUNT
 """
 
 # mypy: ignore-errors
