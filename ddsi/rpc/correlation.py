@@ -40,15 +40,17 @@ class CorrelatedWriter(DataWriter[T], Generic[T]):
         pump = self._pump
         now = pump.now()
         await pump.checkpoint(now)
-        self._check_open()
+        self._check_enabled()
         payload = self._serialize(sample)
         key = self._support.key(sample) if self._is_keyed else b""
         if self._writer.behavior.lacks_room(len(payload), key) is not None:
             now = await self._wait_for_room(len(payload), key)
         change = pump.engine.write(
             self._writer, ChangeKind.ALIVE, payload, key, now,
+            source_timestamp=self._source_ticks(None) if self._is_by_source else None,
             key_hash=self._key_hash(key) if self._hides_keys else b"", related=related,
         )  # fmt: skip
+        self._instances[key] = None
         pump.written(now)
         return self.guid, change.sequence_number
 
