@@ -58,6 +58,7 @@ MODULE = "ddsi_dynamic"
 
 _INT_ENUM: Any = enum.IntEnum  # called with literals, these make classes, which no checker knows how to say
 _INT_FLAG: Any = enum.IntFlag
+_ANNOTATED: Any = Annotated  # markers in any number are not for checkers either
 
 _PRIMITIVES: dict[int, Any] = {
     TypeKind.BOOLEAN: idl.boolean,
@@ -370,7 +371,7 @@ class _Classes:
 
 
 def _annotated(type_: Any, *markers: Any) -> Any:
-    return Annotated.__class_getitem__((type_, *markers))  # type: ignore[attr-defined]
+    return _ANNOTATED[(type_, *markers)]
 
 
 def _bounded(type_: Any, bound: int) -> Any:
