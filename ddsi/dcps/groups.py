@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
 import trio
 
 from ..engine import LocalWriter
-from ..structure.errors import BadParameter, PreconditionNotMet
+from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.qos import Qos
 from ..structure.qos_changes import check_changeable
 from ..structure.qos_policies import AccessScope
@@ -21,12 +21,13 @@ from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VI
 from ..structure.status import DataAvailable, DataOnReaders
 from .conditions import ReadCondition
 from .endpoint import Endpoint, follow_all
-from .entity import Entity, Parent
+from .entity import Entity, Parent, deadline_scope
 from .sample_reader import SampleReader
 from .topic import Topic
 
 if TYPE_CHECKING:
     from .data_reader import DataReader
+    from .data_writer import DataWriter
     from .participant import DomainParticipant
 
 __all__ = ["Publisher", "Subscriber", "check_family"]
@@ -143,10 +144,30 @@ class Publisher(_Group):
         self._check_open()
         if not self._is_suspended:
             raise PreconditionNotMet(f"{self!r}: publications are not suspended; call suspend_publications() before")
+        self._resume()
+        self._pump.settle()
+
+    def _resume(self) -> None:
         self._is_suspended = False
         for writer in self._writers():
             self._pump.engine.presentation.resume(writer, self._pump.now())
-        self._pump.settle()
+
+    async def wait_for_acknowledgments(self, timeout: float | None = None) -> None:
+        """Until every matched reliable reader has all that the publisher's writers wrote so far.
+
+        DDS 1.4 §2.2.2.4.1.12.  Raises DdsTimeout, AlreadyDeleted.
+        """
+        self._check_open()
+        with deadline_scope(timeout):
+            for writer in [member for member in self._members if isinstance(member, Endpoint)]:
+                await cast("DataWriter[Any]", writer).wait_for_acknowledgments()
+            return
+        raise DdsTimeout(f"{self!r}: not all of its readers have acknowledged all after {timeout} s")
+
+    def _on_close(self) -> None:
+        if self._is_suspended:  # what was written shall not be lost by that
+            self._participant._when_running(lambda pump: self._resume())
+        super()._on_close()
 
     def _writers(self) -> list[LocalWriter]:
         endpoints = [member._local() for member in self._members if isinstance(member, Endpoint)]

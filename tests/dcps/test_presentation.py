@@ -347,3 +347,27 @@ async def test_what_keep_last_replaces_while_suspended_is_never_sent(domain: int
         publisher.resume_publications()
         await eventually(lambda: len(reader._history) == 1)
         assert numbers(reader.take()) == [4]
+
+
+@in_trio
+async def test_a_publisher_that_is_closed_sends_what_it_kept(domain: int) -> None:
+    async with stage(domain, Presentation()) as s:
+        s.publisher.suspend_publications()
+        for writer in s.writers:
+            await writer.write(Shape("RED", 1))
+        s.publisher.close()
+        await eventually(lambda: all(reader.read(max_samples=1) for reader in s.readers))
+
+
+@in_trio
+async def test_a_publisher_waits_for_the_acknowledgments_of_all_its_writers(domain: int) -> None:
+    async with stage(domain, Presentation()) as s:
+        await s.writers[1].write(Shape("RED", 1))
+        await s.publisher.wait_for_acknowledgments(timeout=5)
+        assert s.held() == 1
+        s.publisher.suspend_publications()
+        await s.writers[0].write(Shape("RED", 1))
+        with pytest.raises(ddsi.DdsTimeout, match="Publisher"):
+            await s.publisher.wait_for_acknowledgments(timeout=0.02)
+        s.publisher.resume_publications()
+        await s.publisher.wait_for_acknowledgments(timeout=5)

@@ -244,3 +244,8 @@ def test_request_and_reply() -> None:
         "alice: heartbeat: says which samples there are",
         "bob:   nothing, REMOTE_EX_INVALID_ARGUMENT",
     ]
+
+
+def test_coherent_sets() -> None:
+    poses = [f"at ({step}, {2 * step}), looking to {90 * step} degrees" for step in range(4)]
+    assert sorted(output_of(EXAMPLES / "10_coherent_sets.py")) == [*poses, "withdrawn: the compass does not answer"]
