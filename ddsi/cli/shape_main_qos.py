@@ -93,9 +93,8 @@ def _writer_qos(options: ShapeMainOptions) -> Qos:
         qos |= Qos(ownership_strength=OwnershipStrength(options.ownership_strength))
     if options.lifespan_ms:
         qos |= Qos(lifespan=Lifespan(options.lifespan_ms / 1000))
-    if options.final_instance_state == "u":  # readers shall see that nobody writes, not that it is at its end
-        qos |= Qos(writer_data_lifecycle=WriterDataLifecycle(autodispose_unregistered_instances=False))
-    return qos
+    # Readers shall see that nobody writes, not that instances are at their end, unless they are disposed on purpose.
+    return qos | Qos(writer_data_lifecycle=WriterDataLifecycle(autodispose_unregistered_instances=False))
 
 
 def _reader_qos(options: ShapeMainOptions) -> Qos:

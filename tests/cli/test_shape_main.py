@@ -120,6 +120,13 @@ def test_options_become_policies() -> None:
     assert group_qos(options).partition == p.Partition("p1")
 
 
+@pytest.mark.parametrize("final", ["", "--final-instance-state u", "--final-instance-state d"])
+def test_the_end_of_a_writer_disposes_nothing(final: str) -> None:
+    """The suite's FinalInstanceState_2 wants to see that nobody writes; case 1 disposes in so many words."""
+    qos = endpoint_qos(_options(f"-P {final}"))
+    assert qos.writer_data_lifecycle == p.WriterDataLifecycle(autodispose_unregistered_instances=False)
+
+
 def test_a_subscriber_has_neither_strength_nor_lifespan() -> None:
     qos = endpoint_qos(_options("-S -s 3 -k 5 --lifespan 250 --time-filter 1000"))
     assert (qos.ownership, qos.ownership_strength, qos.lifespan) == (p.Exclusive(), None, None)
