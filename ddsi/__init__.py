@@ -27,7 +27,6 @@ are first used; everything else may change.
 from typing import TYPE_CHECKING
 
 from .config import Config
-from .config.qos_profiles import QosProvider
 from .config.secure import secure
 from .dcps import (
     BuiltinTopicReader,
@@ -140,8 +139,10 @@ if TYPE_CHECKING:
     from . import aio as aio
     from . import blocking as blocking
     from . import rpc as rpc
+    from .config.qos_profiles import QosProvider as QosProvider
     from .dcps.persistence_service import PersistenceService as PersistenceService
 else:
+    _LAZY = {"PersistenceService": "dcps.persistence_service", "QosProvider": "config.qos_profiles"}
 
     def __getattr__(name: str) -> object:
         """``ddsi.rpc`` after ``import ddsi`` alone: few programs need these, so they are not imported before."""
@@ -149,10 +150,10 @@ else:
             from importlib import import_module
 
             return import_module(f".{name}", __name__)
-        if name == "PersistenceService":
-            from .dcps.persistence_service import PersistenceService
+        if name in _LAZY:
+            from importlib import import_module
 
-            return PersistenceService
+            return getattr(import_module(f".{_LAZY[name]}", __name__), name)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -80,8 +80,9 @@ async def topics(domain: int, count: int) -> dict[str, float]:
         before_mib, start = resident_mib(), time.process_time()
         writers = [ddsi.DataWriter(here, ddsi.Topic(here, f"Track{at}", Track), QOS) for at in range(count)]
         wanting = [ddsi.DataReader(there, ddsi.Topic(there, f"Track{at}", Track), QOS) for at in range(count)]
-        for entity in (*writers, *wanting):
-            await entity.wait_for_matched(timeout=_TIMEOUT_S)
+        for writer, reader in zip(writers, wanting, strict=True):
+            await writer.wait_for_matched(timeout=_TIMEOUT_S)
+            await reader.wait_for_matched(timeout=_TIMEOUT_S)
         seconds = time.process_time() - start
         return {"us": seconds / count * 1e6, "kib": (resident_mib() - before_mib) * 1024 / count}
 
