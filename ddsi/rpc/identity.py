@@ -1,7 +1,8 @@
 """Who asked, which answer it is, and what became of it: the headers of requests and replies.
 
 DDS-RPC 1.0 §7.5.1.1.1 (common types), as IDL types of the same names.  In CDR a SampleIdentity is 24 octets: a Guid,
-and a sequence number as two halves.
+and a sequence number as two halves.  None of them is ``@nested``, as the specification's are not: peers that compare
+types tell the difference.
 """
 
 from __future__ import annotations
@@ -36,25 +37,25 @@ class RemoteError(DdsError):
         self.code = code
 
 
-@idl.struct(typename="dds::EntityId_t", extensibility=idl.FINAL, nested=True)
+@idl.struct(typename="dds::EntityId_t", extensibility=idl.FINAL)
 class _EntityId:
     entity_key: Annotated[idl.sequence[idl.octet], idl.array(3), idl.name("entityKey")]
     entity_kind: Annotated[idl.octet, idl.name("entityKind")]
 
 
-@idl.struct(typename="dds::GUID_t", extensibility=idl.FINAL, nested=True)
+@idl.struct(typename="dds::GUID_t", extensibility=idl.FINAL)
 class _Guid:
     guid_prefix: Annotated[idl.sequence[idl.octet], idl.array(12), idl.name("guidPrefix")]
     entity_id: Annotated[_EntityId, idl.name("entityId")]
 
 
-@idl.struct(typename="dds::SequenceNumber_t", extensibility=idl.FINAL, nested=True)
+@idl.struct(typename="dds::SequenceNumber_t", extensibility=idl.FINAL)
 class _SequenceNumber:
     high: idl.int32
     low: idl.uint32
 
 
-@idl.struct(typename="dds::SampleIdentity", extensibility=idl.FINAL, nested=True)
+@idl.struct(typename="dds::SampleIdentity", extensibility=idl.FINAL)
 class SampleIdentity:
     """One sample of one writer: what a request is known by."""
 
@@ -75,7 +76,7 @@ class SampleIdentity:
         return Guid(octets), (number.high << 32) + number.low
 
 
-@idl.struct(typename="dds::rpc::RequestHeader", extensibility=idl.FINAL, nested=True)
+@idl.struct(typename="dds::rpc::RequestHeader", extensibility=idl.FINAL)
 class RequestHeader:
     """``instance_name``: which of several services of one name is meant; empty for any."""
 
@@ -83,7 +84,7 @@ class RequestHeader:
     instance_name: Annotated[str, idl.bound(255), idl.name("instanceName")] = ""
 
 
-@idl.struct(typename="dds::rpc::ReplyHeader", extensibility=idl.FINAL, nested=True)
+@idl.struct(typename="dds::rpc::ReplyHeader", extensibility=idl.FINAL)
 class ReplyHeader:
     related_request_id: Annotated[SampleIdentity, idl.name("relatedRequestId")]
     remote_ex: Annotated[RemoteExceptionCode, idl.name("remoteEx")] = RemoteExceptionCode.REMOTE_EX_OK
