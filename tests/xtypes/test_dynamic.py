@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import ddsi
 from ddsi import idl
@@ -17,6 +18,7 @@ from ddsi.xtypes.resolution import named_type
 from ddsi.xtypes.type_object import BuiltTypes, decode_type_object
 from ddsi.xtypes.type_object.builder import build
 
+from .random_idl import RandomIdl
 from .random_types import samples
 from .type_object.vectors import VECTORS, compiled
 
@@ -76,6 +78,16 @@ def test_random_types_become_the_same_type_again(sample: Any) -> None:
 @given(samples())
 def test_minimal_type_objects_are_enough_for_samples(sample: Any) -> None:
     assert_same_samples(sample, ddsi.dynamic_type(received(type(sample), complete=False)))
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**9), st.booleans())
+def test_types_of_random_idl_become_the_same_type_again(seed: int, keys: bool) -> None:
+    top: Any = idl.loads(RandomIdl(seed, keys=keys, enums=True).text()).m.Top
+    dynamic = ddsi.dynamic_type(received(top))
+    for kind in (True, False):
+        assert rebuilt(dynamic, complete=kind).octets == ddsi.type_objects(top, complete=kind).octets
+    assert idl.to_idl(dynamic) == idl.to_idl(top)
 
 
 EVERYTHING = """
