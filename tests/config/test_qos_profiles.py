@@ -416,6 +416,31 @@ def test_the_value_of_a_property_is_in_no_message(written: Written) -> None:
     assert "hunter2" not in repr(provider.writer("L::P"))
 
 
+def test_security_from_a_file_is_that_of_a_keystore_folder(written: Written, tmp_path: Path) -> None:
+    names = (
+        "identity_ca.cert.pem",
+        "cert.pem",
+        "key.pem",
+        "permissions_ca.cert.pem",
+        "governance.p7s",
+        "permissions.p7s",
+    )
+    for name in names:
+        (tmp_path / name).touch()
+    secured = ddsi.secure(tmp_path)
+    texts = {
+        name: value.value if isinstance(value, ddsi.Property) else value for name, value in secured.properties.items()
+    }
+    elements = "".join(f"<element><name>{name}</name><value>{text}</value></element>" for name, text in texts.items())
+    provider = written(
+        "<dds><qos_profile name='Secured'><domain_participant_qos>"
+        f"<property><value>{elements}</value></property></domain_participant_qos></qos_profile></dds>"
+    )
+    read = provider.participant("Secured").properties
+    assert {name: value.value for name, value in read.items() if isinstance(value, ddsi.Property)} == texts
+    assert len(texts) == 6
+
+
 # --- the document ----------------------------------------------------------------------------------------------
 
 
