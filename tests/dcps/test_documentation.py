@@ -30,7 +30,9 @@ def names(cell: str) -> list[str]:
     return re.findall(r"`([^`]+)`", cell)
 
 
-ALL_ROWS = [row for title in ("Policies", "Statuses", "Conditions", "Entities") for row in rows(title)]
+ALL_ROWS = [
+    row for title in ("Policies", "Statuses", "Conditions", "Filters and wait sets", "Entities") for row in rows(title)
+]
 
 
 @lru_cache
