@@ -12,6 +12,7 @@ import difflib
 import enum
 import json
 import math
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -79,10 +80,21 @@ def form_of(type_: IdlType, value: Any) -> Form:
             return {_key_text(form_of(type_.key, key)): form_of(type_.value, item) for key, item in value.items()}
         case SequenceType() | ArrayType():
             return _elements_form(type_, value)
-        case Primitive(code="f" | "d"):
-            return float(value) if math.isfinite(value) else str(float(value))
+        case Primitive(code="f" | "d" as code):
+            return _float_form(float(value), code)
         case _:
             return value
+
+
+def _float_form(value: float, code: str) -> Form:
+    """Of a float32 the shortest number that it stands for: 0.1, and not all of 0.10000000149011612."""
+    if not math.isfinite(value):
+        return str(value)
+    if code == "f":
+        octets = struct.pack("f", value)
+        shorter = (float(f"{value:.{digits}g}") for digits in (6, 7, 8))
+        return next((short for short in shorter if struct.pack("f", short) == octets), value)
+    return value
 
 
 def _union_form(type_: UnionType, value: Any) -> Form:

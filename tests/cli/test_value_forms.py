@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from ddsi.cli.typed_values import typed_form
 from ddsi.cli.value_forms import form_of, value_of
 from ddsi.structure.errors import BadParameter
 from ddsi.xtypes import serialize
+from ddsi.xtypes.model import FLOAT32
 from ddsi.xtypes.resolution import named_type
 from tests.xtypes.random_types import samples
 
@@ -60,6 +62,13 @@ def test_everything_that_can_be_typed() -> None:
             "origin": {"x": "nan", "y": 0.0}, "words": ["a", "b"], "class": 5, "bits": [True, False],
         }
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["0.1", "16777216.0", "-3.4028235e+38", "1.4013e-45", "0.33333334", "nan", "-inf"])
+def test_a_float_is_as_short_as_it_can_be(text: str) -> None:
+    held = struct.unpack("f", struct.pack("f", float(text)))[0]
+    assert str(form_of(FLOAT32, held)) == text
+    assert struct.pack("f", value_of(FLOAT32, form_of(FLOAT32, held))) == struct.pack("f", held)
 
 
 def test_what_is_not_said_has_its_default() -> None:
