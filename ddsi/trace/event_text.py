@@ -131,8 +131,6 @@ def _other(event: TraceEvent, names: Names) -> str:
             return f"timer {printable(timer)}{f' ({seconds_text(round(late, 6))} late)' if late > 1e-6 else ''}"
         case e.LivelinessChanged(reader=reader, writer=writer, alive=alive):
             return f"{names.guid(writer)} is {'alive' if alive else 'not alive'} for {_entity(reader, names)}"
-        case e.DeadlineMissed(endpoint=endpoint, key_hash=key_hash):
-            return f"deadline missed on {_entity(endpoint, names)}, instance {key_hash.hex() or 'of a keyless topic'}"
         case e.StatusChanged(entity=entity, status=status, detail=detail):
             return f"{printable(status)} of {names.guid(entity)}{_detail(detail)}"
         case e.SecurityEvent(remote=remote, what=what, detail=detail):

@@ -24,7 +24,6 @@ __all__ = [
     "EVENT_TYPES",
     "Acknowledged",
     "ChangeWritten",
-    "DeadlineMissed",
     "Dropped",
     "EndpointChanged",
     "EndpointClosed",
@@ -412,20 +411,6 @@ class LivelinessChanged(TraceEvent):
 
 
 @dataclass(frozen=True, slots=True)
-class DeadlineMissed(TraceEvent):
-    """An instance went without a sample for a deadline period; ``endpoint`` is ours.
-
-    ``key_hash`` names the instance; where its data is protected, only as the hash that may be seen on the wire.
-    """
-
-    NAME: ClassVar[str] = "deadline_missed"
-    CATEGORY: ClassVar[Category] = Category.STATUS
-
-    endpoint: Guid
-    key_hash: bytes
-
-
-@dataclass(frozen=True, slots=True)
 class StatusChanged(TraceEvent):
     """A communication status of a local entity changed; ``detail`` in words (DDS 1.4 §2.2.4.1)."""
 
@@ -532,7 +517,6 @@ EVENT_TYPES: dict[str, type[TraceEvent]] = {
         Acknowledged,
         TimerFired,
         LivelinessChanged,
-        DeadlineMissed,
         StatusChanged,
         SecurityEvent,
         LinkDropped,

@@ -43,7 +43,6 @@ SAMPLES: list[TraceEvent] = [
     e.Acknowledged(1.0, A, WRITER, READER, 3),
     e.TimerFired(1.0, A, "heartbeat", 0.999),
     e.LivelinessChanged(1.0, B, READER, WRITER, False),
-    e.DeadlineMissed(1.0, B, READER, b"\x00\x00\x00\x05BLUE\x00"),
     e.StatusChanged(1.0, B, READER, "subscription_matched", "1 writer"),
     e.SecurityEvent(1.0, A, READER, "handshake_failed", "the certificate has expired"),
     e.SecurityEvent(1.0, A, None, "governance_read"),

@@ -36,7 +36,6 @@ rejected Square #7 of A: samples_limit
 Square@B has Square up to #3
 timer heartbeat (1 ms late)
 Square@A is not alive for Square
-deadline missed on Square, instance 00000005424c554500
 subscription_matched of Square@B (1 writer)
 security: handshake_failed Square@B (the certificate has expired)
 security: governance_read
