@@ -133,6 +133,8 @@ class AnnouncedType:
         if len(self.endpoints) > _MOST_NAMED:
             yield f"//   and {len(self.endpoints) - _MOST_NAMED} more"
         if self.idl is not None:
+            if "complete" not in self.identifiers():
+                yield "//   which tell no names: types are called by their hashes here, members by their ids"
             yield self.idl
             return
         yield f"// Its IDL is not to be had: {shown(self.reason)}."

@@ -146,18 +146,19 @@ class _Classes:
         base = self._graph.base_of(identifier)
         if base is not None:
             self._define(base)
-        python_class = self._said_by_author(identifier, lambda: self._class_of(identifier))
+        python_class = self._blaming(identifier, lambda: self._class_of(identifier))
         if python_class is not None:
             self._classes[identifier] = self._names[self._keys[identifier]] = python_class
 
     def _complete(self, identifier: HashedIdentifier, python_class: type[Any]) -> None:
         """Let the decorators look at what was not there yet when the class was made."""
-        type_ = named_type(python_class) if not issubclass(python_class, int) else None
+        type_ = named_type(python_class)
         if isinstance(type_, (StructType, UnionType)):
             composite = type_
-            self._said_by_author(identifier, lambda: refuse_impossible(composite))
+            self._blaming(identifier, lambda: refuse_impossible(composite))
 
-    def _said_by_author(self, identifier: HashedIdentifier, act: Callable[[], Any]) -> Any:
+    def _blaming(self, identifier: HashedIdentifier, act: Callable[[], Any]) -> Any:
+        """What ``act`` returns; what it refuses is told with the type's name."""
         try:
             return act()
         except ValueError as error:  # BadParameter, and what enum raises for names that it keeps

@@ -215,6 +215,14 @@ def test_what_is_said_of_a_type_without_idl_is_idl_all_the_same() -> None:
     assert one.json()["identifiers"]["complete"] == "f2" + INFORMATION.complete.hex()
 
 
+def test_a_type_without_names_is_said_to_be_one() -> None:
+    half = ddsi.type_information(idl.loads(SHAPE).ShapeType).encode()[4:52]  # the minimal half alone
+    (one,) = announced_types(census(("T", "A", bytes([48, 0, 0, 0]) + half)), "T")
+    one.idl = "struct Type_1 { int32 member_0; };"
+    assert list(one.identifiers()) == ["minimal"]
+    assert "//   which tell no names: types are called by their hashes here, members by their ids" in one.lines()
+
+
 def test_what_is_no_type_information_has_no_identifiers() -> None:
     (one,) = announced_types(census(("T", "A", b"nonsense")), "T")
     assert one.identifiers() == {}
