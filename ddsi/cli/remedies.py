@@ -35,6 +35,9 @@ def disagreements(
     """All that stands between the two, one by one; the remedies are independent of each other."""
     match refusal.kind:
         case RefusalKind.TYPE:
+            if refusal.detail:
+                wanted = f"{refusal.requested}; {refusal.detail}"
+                return (Disagreement("type", refusal.offered, wanted, _structure_remedy(refusal.detail)),)
             remedy = _type_remedy(writer, reader)
             return (Disagreement("type", refusal.offered, refusal.requested, remedy),)
         case RefusalKind.PARTITION:
@@ -64,6 +67,15 @@ def _type_remedy(writer: DiscoveredWriterData, reader: DiscoveredReaderData) -> 
     if _last_part(writer.type_name) == _last_part(reader.type_name):
         return "the type is in another module, or a vendor names it otherwise: give it one full name on both sides"
     return "the sides use one topic name for different types: rename one topic, or give both the same type name"
+
+
+def _structure_remedy(detail: str) -> str:
+    if " for the reader, " in detail and " for the writer" in detail:
+        return (
+            "say @final, @appendable or @mutable in the IDL of both sides: without, Cyclone DDS takes a type for final "
+            "and others take it for appendable"
+        )
+    return "declare the member alike on both sides, or let TypeConsistency of the reader allow the difference"
 
 
 def _last_part(type_name: str) -> str:

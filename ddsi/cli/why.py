@@ -1,7 +1,7 @@
 """``ddsi why``: why do these two not match?  Policy, both values and the remedy, for every pair that was seen.
 
-It judges what participants announce, as this implementation's own endpoints would.  Types are compared by name and
-key; whether two types of one name can be assigned to each other, their owners decide.
+It judges what participants announce, as this implementation's own endpoints would.  Types that both sides announce are
+fetched and compared; others go by name and key.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from .listening import listen, observer
 from .remedies import Disagreement, disagreements
 from .runner import run as run_async
 from .tables import shown
+from .type_judgements import TypeJudgements, judge_types, with_types
 
 __all__ = ["SUMMARY", "Diagnosis", "Lonely", "Mismatch", "add_arguments", "diagnose", "run"]
 
@@ -50,7 +51,8 @@ async def _explain(arguments: argparse.Namespace) -> int:
     async with observer(arguments.domain, "ddsi why") as participant:
         await listen(participant, arguments.time)
         census = take_census(participant)
-    diagnosis = diagnose(census, arguments.topic)
+        judgements = await judge_types(participant, _asked(census, arguments.topic))
+    diagnosis = diagnose(census, arguments.topic, judgements)
     if arguments.json:
         print(json.dumps(_diagnosis_json(diagnosis), indent=2))
     else:
@@ -92,14 +94,21 @@ class Diagnosis:
         return bool(self.asked) and not (self.mismatches or self.lonely or self.matching)
 
 
-def diagnose(census: Census, topic: str = "") -> Diagnosis:
-    """Everything that keeps endpoints of the topic (a shell pattern; empty for any) apart."""
-    pairs = [pair for pair in census.pairs() if not topic or fnmatchcase(pair.writer.topic_name, topic)]
+def diagnose(census: Census, topic: str = "", judgements: TypeJudgements | None = None) -> Diagnosis:
+    """Everything that keeps endpoints of the topic (a shell pattern; empty for any) apart.
+
+    ``judgements``: what is known of their types besides names.
+    """
+    pairs = [with_types(pair, judgements or {}) for pair in _asked(census, topic)]
     mismatches = tuple(
         Mismatch(pair, disagreements(pair.writer, pair.reader, pair.refusal)) for pair in pairs if pair.refusal
     )
     lonely = tuple(found for found in _lonely(census) if not topic or fnmatchcase(found.topic, topic))
     return Diagnosis(census, topic, mismatches, lonely, len(pairs) - len(mismatches))
+
+
+def _asked(census: Census, topic: str) -> Iterator[Pair]:
+    return (pair for pair in census.pairs() if not topic or fnmatchcase(pair.writer.topic_name, topic))
 
 
 def _lonely(census: Census) -> Iterator[Lonely]:

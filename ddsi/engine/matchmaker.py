@@ -18,7 +18,7 @@ from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData,
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
-from ..trace.reasons import LossReason, TypeStep
+from ..trace.reasons import LossReason
 from .content_filters import writer_side_filter
 from .local_endpoints import LocalReader, LocalWriter
 from .type_matching import TypeVerdict
@@ -212,7 +212,7 @@ class Matchmaker:
             engine.type_matching.no_longer_waiting(local, remote.guid)
         if types.step is not None and is_news:
             engine.recorder.types_compared(local, remote.guid, remote.topic_name, types.step, types.detail)
-        if types.step is TypeStep.EXTENSIBILITY and remote.guid.prefix != engine.guid.prefix:
+        if types.withdraws and remote.guid.prefix != engine.guid.prefix:
             engine.discovery.withdraw_types(endpoint, now)  # or the other would refuse us
         return not types.is_awaited
 

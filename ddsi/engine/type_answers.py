@@ -8,6 +8,7 @@ dropped and counted, and asked again by who meant them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..discovery.type_lookup import (
@@ -28,6 +29,7 @@ from ..trace.reasons import DropReason
 from ..xtypes.type_object import HashedIdentifier, TypeIdentifier
 from ..xtypes.type_object.information import SizedIdentifier
 from ..xtypes.type_object.references import hashes_in
+from .type_quirks import knows_old_kinds_alone
 from .type_registry import TypeRegistry
 
 if TYPE_CHECKING:
@@ -74,7 +76,9 @@ class TypeAnswers:
         elif not self._may_answer(prefix):
             engine.dropped(DropReason.RATE_LIMITED, None, f"{change.writer_guid} acknowledges no answers")
         else:
-            self._answer(writer_id, prefix, TypeLookupReply(request.request_id, self._result(request.call)), now)
+            self._answer(
+                writer_id, prefix, TypeLookupReply(request.request_id, self._result(request.call, prefix)), now
+            )
 
     def participant_lost(self, prefix: bytes) -> None:
         self._under_way.pop(prefix, None)
@@ -105,12 +109,15 @@ class TypeAnswers:
         change = self._engine.write(writer, ChangeKind.ALIVE, encode_reply(reply), b"", now, destination=destination)
         self._under_way.setdefault(prefix, []).append((writer_id, change.sequence_number))
 
-    def _result(self, call: GetTypes | GetDependencies) -> FoundTypes | FoundDependencies:
+    def _result(self, call: GetTypes | GetDependencies, prefix: bytes) -> FoundTypes | FoundDependencies:
         if isinstance(call, GetTypes):
-            return self._types(call.type_ids)
+            proxy = self._engine.participants.get(prefix)
+            is_old = proxy is not None and knows_old_kinds_alone(proxy.data)
+            registry = self._registry
+            return self._types([one for one in call.type_ids if not (is_old and registry.has_new_kinds(one))])
         return self._dependencies(call.type_ids, call.continuation_point)
 
-    def _types(self, type_ids: tuple[TypeIdentifier, ...]) -> FoundTypes:
+    def _types(self, type_ids: Sequence[TypeIdentifier]) -> FoundTypes:
         found: list[tuple[TypeIdentifier, bytes]] = []
         room = MOST_ANSWER_OCTETS
         for identifier in dict.fromkeys(type_ids):

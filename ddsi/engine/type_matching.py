@@ -15,6 +15,7 @@ names are equal, the samples are XCDR1, and nothing but final or appendable is b
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ from ..structure.qos_policies import DataRepresentationId, TypeConsistency
 from ..trace.reasons import TypeStep
 from ..xtypes.assignability import MissingType, TypeMismatch, type_mismatch
 from ..xtypes.type_object import HashedIdentifier, TypeInformation, decode_type_information
+from .type_quirks import knows_old_kinds_alone
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -40,11 +42,13 @@ _NEITHER = "neither announces type information"
 @dataclass(frozen=True, slots=True)
 class TypeVerdict:
     """``refusal``: why the types do not fit.  ``step``: what else is to be told of a pair, with its detail in words;
-    the match of one that is AWAITED has to wait."""
+    the match of one that is AWAITED has to wait.  ``withdraws``: our endpoint must go by its type's name from now on,
+    or the other would not match it."""
 
     refusal: MatchRefusal | None = None
     step: TypeStep | None = None
     detail: str = ""
+    withdraws: bool = False
 
     @property
     def is_awaited(self) -> bool:
@@ -77,9 +81,11 @@ class TypeMatching:
             return self._by_name(writer, reader, refusal, _without(writer, reader, of_writer, of_reader))
         if of_writer.minimal == of_reader.minimal or of_writer.complete == of_reader.complete:
             return FITS
-        remote, information = (
-            (reader, of_reader) if writer.guid.prefix == self._engine.guid.prefix else (writer, of_writer)
-        )
+        is_writer_ours = writer.guid.prefix == self._engine.guid.prefix
+        remote, information = (reader, of_reader) if is_writer_ours else (writer, of_writer)
+        if self._is_unreadable(of_writer if is_writer_ours else of_reader, remote):
+            why = f"{remote.guid} cannot read what the type of this one is made of"
+            return replace(self._by_name(writer, reader, refusal, why), withdraws=True)
         answer = self._compare(pair, remote.guid.prefix, reader.qos.type_consistency)
         if isinstance(answer, MissingType):
             root = pair[0] if remote is writer else pair[1]
@@ -93,8 +99,13 @@ class TypeMatching:
         if refusal is None and _is_xcdr1(writer):
             lenient = self._compare(pair, remote.guid.prefix, reader.qos.type_consistency, ignores_extensibility=True)
             if lenient is None:
-                return TypeVerdict(step=TypeStep.EXTENSIBILITY, detail=str(answer))
+                return TypeVerdict(step=TypeStep.EXTENSIBILITY, detail=str(answer), withdraws=True)
         return TypeVerdict(_refusal(writer, reader, answer))
+
+    def _is_unreadable(self, ours: TypeInformation, remote: DiscoveredEndpointData) -> bool:
+        proxy = self._engine.participants.get(remote.guid.prefix)
+        is_old = proxy is not None and knows_old_kinds_alone(proxy.data)
+        return is_old and self._engine.types.registry.has_new_kinds(ours.minimal)
 
     def _by_name(
         self, writer: DiscoveredWriterData, reader: DiscoveredReaderData, refusal: MatchRefusal | None, why: str

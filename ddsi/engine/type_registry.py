@@ -27,6 +27,7 @@ from ..xtypes.type_object import (
 )
 from ..xtypes.type_object.kinds import COMPLETE
 from ..xtypes.type_object.references import hashed_only, references
+from .type_quirks import has_new_kinds
 
 __all__ = ["MOST_NEEDED", "TypeRegistry"]
 
@@ -43,6 +44,7 @@ class TypeRegistry:
     def __init__(self) -> None:
         self._own: dict[HashedIdentifier, TypeObject] = {}
         self._own_octets: dict[HashedIdentifier, bytes] = {}
+        self._with_new_kinds: set[HashedIdentifier] = set()
         self._minimal_of: dict[HashedIdentifier, HashedIdentifier] = {}
         self._others: OrderedDict[tuple[bytes, HashedIdentifier], bytes] = OrderedDict()  # prefix empty: anybody's
         self._objects: dict[HashedIdentifier, TypeObject] = {}
@@ -56,11 +58,17 @@ class TypeRegistry:
         for types in (description.minimal, description.complete):
             self._own |= types.objects
             self._own_octets |= types.octets
+            new = {identifier for identifier, found in types.objects.items() if has_new_kinds(found)}
+            self._with_new_kinds |= new | ({types.root} if new else set())
         self._minimal_of[description.complete.root] = description.minimal.root
 
     def own_octets(self, identifier: TypeIdentifier) -> bytes | None:
         """The TypeObject of one of our types as it is sent; None if it is none of ours."""
         return self._own_octets.get(identifier) if isinstance(identifier, HashedIdentifier) else None
+
+    def has_new_kinds(self, identifier: TypeIdentifier) -> bool:
+        """Has this type of ours, or does a topic type need, what some peers cannot be told (``type_quirks``)?"""
+        return identifier in self._with_new_kinds
 
     def minimal_of(
         self, identifiers: Iterable[TypeIdentifier]

@@ -438,8 +438,13 @@ _UNSIGNED = {1: TypeKind.UINT8, 2: TypeKind.UINT16, 4: TypeKind.UINT32, 8: TypeK
 
 
 def _number_kind(shape: _Shape) -> TypeKind | None:
-    """What primitive types and bitmasks have in common: a bitmask fits the unsigned integer that it travels as."""
+    """What primitive types and bitmasks have in common: a bitmask fits the unsigned integer that it travels as.
+
+    To Cyclone DDS 0.10 a uint8 is a byte, so these are one.
+    """
     match shape:
+        case PrimitiveIdentifier(kind=TypeKind.BYTE):
+            return TypeKind.UINT8
         case PrimitiveIdentifier(kind=kind):
             return kind
         case BitmaskObject(bit_bound=bit_bound):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from ddsi.cli import why
@@ -11,6 +13,7 @@ from ddsi.discovery.matching import judge
 from ddsi.structure import qos_policies as p
 from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.qos import EndpointQos
+from ddsi.xtypes.assignability import TypeMismatch
 
 from .seen import census, reader, writer
 
@@ -139,3 +142,18 @@ def test_pairs_with_the_same_reasons_are_told_of_together() -> None:
 def test_text_from_the_network_is_made_safe() -> None:
     seen = census(writer("\x1b[2J"), reader("\x1b[2J", keyed=False), writer("\x1b]0;x", number=2))
     assert not any("\x1b" in line for line in why._lines(diagnose(seen)))
+
+
+def test_types_that_were_fetched_are_judged_by_what_they_are_made_of() -> None:
+    one, other = writer("x", type_name="T"), reader("x", type_name="U")
+    one, other = replace(one, type_information=b"1"), replace(other, type_information=b"2")
+    question = (b"1", b"2", other.qos.type_consistency)
+    seen = census(one, other)
+    assert [mismatch.disagreements[0].policy for mismatch in diagnose(seen).mismatches] == ["type"]
+    assert diagnose(seen, judgements={question: None}).matching == 1
+    (mismatch,) = diagnose(seen, judgements={question: TypeMismatch("pose.x", "int32 there")}).mismatches
+    (told,) = mismatch.disagreements
+    assert told.requested == "U; pose.x: int32 there"
+    final = TypeMismatch("", "final for the reader, appendable for the writer")
+    (mismatch,) = diagnose(seen, judgements={question: final}).mismatches
+    assert "say @final, @appendable or @mutable" in mismatch.disagreements[0].remedy

@@ -12,6 +12,7 @@ from ddsi import idl
 from ddsi.discovery.matching import RefusalKind
 from ddsi.discovery.type_lookup import GetTypes, TypeLookupReply, TypeLookupRequest, decode_request, encode_request
 from ddsi.engine.type_answers import MOST_UNACKNOWLEDGED
+from ddsi.engine.type_quirks import has_new_kinds
 from ddsi.engine.type_registry import TypeRegistry
 from ddsi.simulation import Domain, LinkConditions, Node
 from ddsi.structure import builtin_entity_ids as ids
@@ -21,6 +22,7 @@ from ddsi.structure.guid import EntityId, Guid
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import DataRepresentation, DataRepresentationId, Reliable, TypeConsistency
 from ddsi.structure.status import InconsistentTopic
+from ddsi.structure.vendor import CYCLONE
 from ddsi.trace.events import TypesCompared
 from ddsi.trace.reasons import DropReason, TypeStep
 from ddsi.trace.sink import MemorySink
@@ -318,6 +320,35 @@ def test_final_and_appendable_do_not_match_in_xcdr2_or_under_other_names() -> No
         other.domain.run(3)
         refusal = other.there.engine.matchmaker.refusals[other.reader.local.guid, other.writer.local.guid]
         assert refusal.detail == "appendable for the reader, final for the writer"
+
+
+# --- peers that cannot read all -------------------------------------------------------------------------------------
+
+
+@idl.struct(typename="T")
+class Modern:
+    outer: Outer
+    small: idl.sequence[idl.uint8]
+
+
+def test_a_peer_that_new_kinds_of_types_would_end_is_not_told_them_and_matches_by_name() -> None:
+    """Cyclone DDS 0.10 takes no TypeObject with an int8, a uint8 or a wstring."""
+    two = Two(None, None)
+    two.domain.run(1)
+    proxy = two.here.engine.participants[two.there.engine.guid.prefix]
+    proxy.data = replace(proxy.data, vendor_id=CYCLONE, protocol_version=(2, 1))
+    writer = two.here.writer("Triangle", RELIABLE, types=of(Modern))
+    reader = two.there.reader("Triangle", RELIABLE, types=of(Other))
+    assert two.domain.run_until(lambda: bool(reader.local.behavior.writers), 5)
+    assert writer.local.data.type_information == b""
+    prefix = two.here.engine.guid.prefix
+    known = two.there.engine.types.registry.known_to(prefix)
+    assert not [one for one in known.values() if has_new_kinds(one)]
+    # Types without these go by what they are made of.
+    two.here.writer("Circle", RELIABLE, types=of(New))
+    circle = two.there.reader("Circle", RELIABLE, types=of(Old))
+    assert two.domain.run_until(lambda: bool(circle.local.behavior.writers), 5)
+    assert known[of(New).minimal.root] is not None
 
 
 # --- strangers ------------------------------------------------------------------------------------------------------

@@ -89,6 +89,9 @@ FITS = [
         "@appendable union U switch (long) { default: long d; }; " + members("U u;"),
         "@appendable union U switch (long) { case 7: long a; default: long d; }; " + members("U u;"),
     ),
+    # To Cyclone DDS 0.10 a uint8 is an octet; and a bitmask travels as one.
+    (members("octet a; sequence<uint8> b;"), members("uint8 a; sequence<octet> b;")),
+    ("@bit_bound(8) bitmask M { x }; " + members("M m;"), members("octet m;")),
 ]
 
 
@@ -105,7 +108,7 @@ DIFFERS = [
     # reader, writer, path, reason; names as complete TypeObjects have them
     (members("long a;"), members("unsigned long a;"), "a", "int32 in the reader's type, uint32 in the writer's"),
     (members("long a;"), members("long long a;"), "a", "int32 in the reader's type, int64 in the writer's"),
-    (members("octet a;"), members("uint8 a;"), "a", "byte in the reader's type, uint8 in the writer's"),
+    (members("octet a;"), members("int8 a;"), "a", "byte in the reader's type, int8 in the writer's"),
     (members("string a;"), members("wstring a;"), "a", "string in the reader's type, wstring in the writer's"),
     (members("sequence<long> a;"), members("sequence<float> a;"), "a[]", "int32 in the reader's"),
     (members("long a[2][3];"), members("long a[3][2];"), "a", "arrays of 2 x 3 and of 3 x 2 elements"),
@@ -153,7 +156,7 @@ DIFFERS = [
     ),
     (
         "@bit_bound(8) bitmask M { x }; " + members("M m;"),
-        members("octet m;"),
+        members("int8 m;"),
         "m",
         "a bitmask of 8 bits M in the reader",
     ),

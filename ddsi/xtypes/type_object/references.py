@@ -23,7 +23,7 @@ from .objects import (
     UnionObject,
 )
 
-__all__ = ["hashed_only", "hashes_in", "references"]
+__all__ = ["hashed_only", "hashes_in", "plain_parts", "references"]
 
 
 def references(type_object: TypeObject) -> Iterator[HashedIdentifier]:
@@ -49,6 +49,25 @@ def hashes_in(identifier: TypeIdentifier) -> Iterator[HashedIdentifier]:
             yield from hashes_in(element)
         case _:
             pass
+
+
+def plain_parts(type_object: TypeObject) -> Iterator[TypeIdentifier]:
+    """The primitives and strings that it names, also as elements of collections."""
+    for identifier in _named(type_object):
+        yield from _plain(identifier)
+
+
+def _plain(identifier: TypeIdentifier) -> Iterator[TypeIdentifier]:
+    match identifier:
+        case SequenceIdentifier(element=element) | ArrayIdentifier(element=element):
+            yield from _plain(element)
+        case MapIdentifier(key=key, element=element):
+            yield from _plain(key)
+            yield from _plain(element)
+        case HashIdentifier() | ComponentIdentifier():
+            pass
+        case _:
+            yield identifier
 
 
 def _named(type_object: TypeObject) -> Iterator[TypeIdentifier]:
