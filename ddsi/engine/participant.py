@@ -386,7 +386,8 @@ class Participant:
         assert reader.history is not None
         reader.history.content_filter = ContentFilter(announced, evaluate)
         reader.data = replace(reader.data, content_filter=announced)
-        self.discovery.announce_reader(reader, now)
+        if any(known is reader for known in self.user_endpoints.readers(reader.data.topic_name)):
+            self.discovery.announce_reader(reader, now)  # others are announced when they are enabled
 
     def delete_writer(self, writer: LocalWriter, now: float) -> None:
         """Say that it is gone; but first its readers may, for a second at most, ask for what they miss."""

@@ -276,6 +276,23 @@ async def test_a_change_that_is_refused_changes_nothing(domain: int) -> None:
 
 
 @in_trio
+async def test_a_reader_that_is_not_enabled_is_announced_with_the_parameters_that_it_has_then(domain: int) -> None:
+    async with ddsi.DomainParticipant(domain) as here, ddsi.DomainParticipant(domain) as there:
+        writer = written(here)
+        later = ddsi.Subscriber(there, ddsi.Qos(entity_factory=ddsi.EntityFactory(autoenable_created_entities=False)))
+        topic = ddsi.Topic(there, "Square", Shape)
+        small = ddsi.ContentFilteredTopic(there, "Filtered", topic, "x = %0", ["1"])
+        reader = ddsi.DataReader(later, small, RELIABLE)
+        small.set_expression_parameters(["2"])
+        await eventually(lambda: here.discovered_participants() and here.knows_all_announced())
+        assert here.discovered_subscriptions() == []
+        reader.enable()
+        await matched(writer, reader)
+        await write(writer, 1, 2, 3)
+        assert (xs(reader), told(reader, writer)) == ([2], 2)
+
+
+@in_trio
 async def test_it_belongs_to_its_participant_and_is_for_readers(domain: int) -> None:
     async with ddsi.DomainParticipant(domain) as one, ddsi.DomainParticipant(domain) as other:
         topic = ddsi.Topic(one, "Square", Shape)
