@@ -249,3 +249,11 @@ def test_request_and_reply() -> None:
 def test_coherent_sets() -> None:
     poses = [f"at ({step}, {2 * step}), looking to {90 * step} degrees" for step in range(4)]
     assert sorted(output_of(EXAMPLES / "10_coherent_sets.py")) == [*poses, "withdrawn: the compass does not answer"]
+
+
+def test_unknown_type() -> None:
+    assert output_of(EXAMPLES / "11_unknown_type.py")[-3:] == [
+        "",
+        "the stranger reads Report(station='Oslo', wind=Wind(speed=3.5, gusts=array('f', [4.0, 7.5])), remark=None)",
+        "the owner reads rain from Bergen",
+    ]
