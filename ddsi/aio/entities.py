@@ -160,6 +160,10 @@ class ContentFilteredTopic(_Async, FilteredTopicPortal[T], Generic[T]):
 class Publisher(_Async, PublisherPortal):
     """The writers created with it have its policies wherever they do not set their own."""
 
+    async def wait_for_acknowledgments(self, timeout: float | None = None) -> None:
+        """Until all that its writers have written so far is acknowledged.  Raises DdsTimeout, AlreadyDeleted."""
+        await self._engine.run_for_asyncio(self._inner.wait_for_acknowledgments, timeout)
+
 
 class Subscriber(_Async, SubscriberPortal):
     """The readers created with it have its policies wherever they do not set their own."""

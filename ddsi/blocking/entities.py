@@ -178,6 +178,10 @@ class ContentFilteredTopic(_Blocking, FilteredTopicPortal[T], Generic[T]):
 class Publisher(_Blocking, PublisherPortal):
     """The writers created with it have its policies wherever they do not set their own."""
 
+    def wait_for_acknowledgments(self, timeout: float | None = None) -> None:
+        """Until all that its writers have written so far is acknowledged.  Raises DdsTimeout, AlreadyDeleted."""
+        self._engine.run(self._inner.wait_for_acknowledgments, timeout)
+
 
 class Subscriber(_Blocking, SubscriberPortal):
     """The readers created with it have its policies wherever they do not set their own."""

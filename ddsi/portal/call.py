@@ -79,6 +79,11 @@ class Call(Generic[R]):
         self._is_done = True
         self._notify()
 
+    @property
+    def is_done(self) -> bool:
+        """Is it over, one way or the other?"""
+        return self._is_done
+
     # --- in the thread that asked ------------------------------------------------------------------------
 
     def outcome(self) -> R:

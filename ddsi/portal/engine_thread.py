@@ -39,6 +39,7 @@ R = TypeVar("R")
 
 _SECONDS_AT_EXIT = 3.0
 _SECONDS_TO_END = 1.0
+_LOOK_S = 0.05
 _log = logging.getLogger("ddsi.portal")
 
 
@@ -105,8 +106,9 @@ class EngineThread:
             done.acquire()
         except BaseException:
             ended = threading.Event()
-            self._submit(call, partial(call.cancel, ended.set))
-            ended.wait()
+            self.post(partial(call.cancel, ended.set))
+            while not (call.is_done or ended.wait(_LOOK_S)):  # nobody tells of it where the thread has just ended
+                pass
             raise
         finally:
             self._pending.discard(call)
@@ -129,12 +131,10 @@ class EngineThread:
             await done
         except asyncio.CancelledError:
             ended = loop.create_future()
-            self._submit(call, partial(call.cancel, partial(_tell, loop, ended)))
-            while not ended.done():
-                try:
-                    await asyncio.shield(ended)
-                except asyncio.CancelledError:  # once more; the first is raised below
-                    continue
+            self.post(partial(call.cancel, partial(_tell, loop, ended)))
+            while not (call.is_done or ended.done()):  # nobody tells of it where the thread has just ended
+                with suppress(asyncio.CancelledError):  # once more; the first is raised below
+                    await asyncio.wait((ended,), timeout=_LOOK_S)
             raise
         finally:
             self._pending.discard(call)

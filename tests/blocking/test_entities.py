@@ -363,6 +363,7 @@ def test_coherent_sets_and_access_to_several_readers(domain: int) -> None:
             writers[0].write(Shape("BLUE", 9))
             raise KeyError
         assert numbers() == []
+        publisher.wait_for_acknowledgments(timeout=5)
         publisher.suspend_publications()
         publisher.resume_publications()
         with pytest.raises(ddsi.PreconditionNotMet):
