@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-# pyright: basic
+# pyright: basic, reportArgumentType=false
 """The types and samples of ours as cyclonedds-python has them, for comparisons.  Importing this needs that package."""
 
 from typing import Any, Optional
