@@ -26,6 +26,7 @@ from ..structure.sample_info import (
     SampleState,
     ViewState,
 )
+from . import source_order
 from .content_filter import ContentFilter
 from .instance import Instance
 from .instance_order import InstanceOrder
@@ -134,7 +135,7 @@ class ReaderHistoryCache:
         if not gate.is_open and not gate.admits(instance, change, now):
             return True
         samples = instance.samples
-        if self._by_source and self._comes_too_late(instance, change):
+        if self._by_source and source_order.comes_too_late(instance, change, self._depth):
             return True
         if self._depth and len(samples) - instance.end_count >= self._depth:
             self._push_out(instance)
@@ -156,7 +157,7 @@ class ReaderHistoryCache:
         if self.arrivals is not None:
             info.arrival = next(self.arrivals)
         if self._by_source and samples:
-            self._insert_by_source(samples, info, _stamp(change))
+            self._insert(samples, source_order.place_of(instance, change), info)
         else:
             samples.append(info)
             self._order.append(info)
@@ -211,7 +212,7 @@ class ReaderHistoryCache:
         """Dispose, unregister, or both.  DDS 1.4 figure 2.11: disposed wins until somebody writes again."""
         may_dispose = self._gate.may_write(change.writer_guid, instance)
         if self._by_source and may_dispose and change.kind & StatusInfo.DISPOSED:
-            may_dispose = self._is_latest(instance, change)
+            may_dispose = source_order.is_latest(instance, change)
         if change.kind & StatusInfo.DISPOSED and may_dispose and instance.state is not InstanceState.NOT_ALIVE_DISPOSED:
             self._end(instance, InstanceState.NOT_ALIVE_DISPOSED, change, now)
         if change.kind & StatusInfo.UNREGISTERED:
@@ -257,38 +258,11 @@ class ReaderHistoryCache:
         instance.view_state = _NEW
         self._gate.revived(instance.key)
 
-    # --- order by source -----------------------------------------------------------------------------------
-
-    def _comes_too_late(self, instance: Instance, change: CacheChange) -> bool:
-        """Is the sample older than what the application has seen already, or than all that KEEP_LAST keeps?"""
-        stamp = _stamp(change)
-        if stamp < instance.settled:
-            return True
-        samples = instance.samples
-        if not self._depth or len(samples) - instance.end_count < self._depth:
-            return False
-        return stamp < next(_stamp(info._change) for info in samples if info.valid_data)
-
-    def _is_latest(self, instance: Instance, change: CacheChange) -> bool:
-        """A dispose: nothing that was written later may be here, or have been.  If so, it ends what came before."""
-        latest = max((_stamp(info._change) for info in instance.samples if info.valid_data), default=instance.settled)
-        stamp = _stamp(change)
-        if stamp < max(latest, instance.settled):
-            return False
-        instance.settled = stamp
-        return True
-
-    def _insert_by_source(self, samples: deque[SampleInfo], info: SampleInfo, stamp: tuple[int, bytes]) -> None:
-        """Before the first sample of its instance that was written later; most often there is none."""
-        later: SampleInfo | None = None
-        place = len(samples)
-        for index in range(len(samples) - 1, -1, -1):
-            known = samples[index]
-            if not known.valid_data or _stamp(known._change) <= stamp:
-                break
-            later, place = known, index
+    def _insert(self, samples: deque[SampleInfo], place: int, info: SampleInfo) -> None:
+        """Among its instance's samples there, and before that of them which follows in the order of arrival."""
+        at = self._order.index(samples[place]) if place < len(samples) else len(self._order)
         samples.insert(place, info)
-        self._order.insert(self._order.index(later) if later is not None else len(self._order), info)
+        self._order.insert(at, info)
 
     # --- room ----------------------------------------------------------------------------------------------
 
@@ -371,7 +345,7 @@ class ReaderHistoryCache:
         if not info.valid_data:
             instance.end_count -= 1
         elif self._by_source:
-            instance.settled = max(instance.settled, _stamp(info._change))
+            source_order.left(instance, info)
 
     def _discard(self, info: SampleInfo) -> None:
         change = info._change
@@ -581,12 +555,6 @@ class ReaderHistoryCache:
         for info, instance in chosen:
             info.generation_rank = latest[info.instance_handle] - _generation(info)
             info.absolute_generation_rank = instance.generation - _generation(info)
-
-
-def _stamp(change: CacheChange | None) -> tuple[int, bytes]:
-    """What BY_SOURCE_TIMESTAMP orders by; where two writers wrote at once all readers decide alike (§2.2.3.17)."""
-    assert change is not None
-    return change.source_timestamp, change.writer_guid
 
 
 def _by_instance(chosen: list[tuple[SampleInfo, Instance]]) -> list[tuple[SampleInfo, Instance]]:
