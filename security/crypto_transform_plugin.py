@@ -162,3 +162,9 @@ class OpensAlike(Protocol):
         then they are decoded.  It is used until keys or endpoints come or go.  None: there is no short way.
         """
         ...
+
+    def payload_opener(
+        self, encoded_buffer: Octets, sending_datawriter_crypto: DatawriterCryptoHandle
+    ) -> Callable[[Octets], Octets | None] | None:
+        """The same for payloads that begin with the same 12 octets."""
+        ...

@@ -51,9 +51,13 @@ _ENDS_BY_HASH_ALONE: Final = frozenset((FAST_DDS, RTI, RTI_MICRO))
 _UNPROVEN_END: Final = Rejected("it ends an instance, and nothing of it is protected")
 _ALIKE: Final = 16
 """So many octets at the head of a protected submessage tell the sender, the key and the session."""
+_PAYLOADS_ALIKE: Final = 12
 _MOST_OPENERS: Final = 4096
 _SMALL: Final = 1 << 12
 """Octets are quicker to take apart as ``bytes`` than through a view, unless it costs more to copy them."""
+
+
+Opener = Callable[[Octets], Octets | None]
 
 
 class Protection:
@@ -77,9 +81,11 @@ class Protection:
         self._handles: dict[
             tuple[Guid, tuple[Guid, ...]], tuple[list[DatareaderCryptoHandle], list[DatawriterCryptoHandle]]
         ] = {}
-        self._opener_of = cryptographic.submessage_opener if isinstance(cryptographic, OpensAlike) else None
-        self._openers: dict[bytes, tuple[Callable[[Octets], Octets | None], Pair]] = {}
+        self._short_ways = cryptographic if isinstance(cryptographic, OpensAlike) else None
+        self._openers: dict[bytes, tuple[Opener, Pair]] = {}
         """By source and first octets of submessages: what opened the last of these, and whose they are."""
+        self._payload_openers: dict[Guid, tuple[bytes, Opener]] = {}
+        """By remote writer: how its last payload began, and what opened it."""
         self._required: dict[bytes, int] = {}
         """What the submessages of a remote endpoint need; by its Guid, until anything about it changes."""
         self.refused = 0
@@ -90,6 +96,7 @@ class Protection:
         self._required.clear()
         self._handles.clear()
         self._openers.clear()
+        self._payload_openers.clear()
 
     # --- outwards ----------------------------------------------------------------------------------------
 
@@ -216,17 +223,13 @@ class Protection:
         if pair.is_volatile and remote.handshake is not None:
             # Only who shares the secret can have said that.  A peer may have no key for us (OpenDDS), but it answers.
             remote.handshake.confirm()
-        if self._opener_of is not None and not pair.is_volatile:
-            self._keep_opener(self._opener_of(protected, sender), protected, source, pair)
+        if self._short_ways is not None and not pair.is_volatile:
+            opener = self._short_ways.submessage_opener(protected, sender)
+            if opener is not None:
+                if len(self._openers) >= _MOST_OPENERS:
+                    self._openers.clear()
+                self._openers[source + bytes(protected[:_ALIKE])] = opener, pair
         return plain
-
-    def _keep_opener(
-        self, opener: Callable[[Octets], Octets | None] | None, protected: Octets, source: bytes, pair: Pair
-    ) -> None:
-        if len(self._openers) >= _MOST_OPENERS:
-            self._openers.clear()
-        if opener is not None:
-            self._openers[source + bytes(protected[:_ALIKE])] = opener, pair
 
     def _speaks_for_itself(self, plain: Octets, pair: Pair) -> bool:
         """Is the sender that a submessage names the one whose key opened it?  INFO_TS names none (Fast DDS)."""
@@ -241,6 +244,17 @@ class Protection:
         return named == pair.remote_entity
 
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        if len(payload) < _SMALL:
+            payload = bytes(payload)
+        known = self._payload_openers.get(writer)
+        if known is not None and payload[:_PAYLOADS_ALIKE] == known[0]:
+            plain = known[1](payload)
+            if plain is not None:
+                return plain
+        return self._decode_payload(writer, payload)
+
+    def _decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+        """The general way of :meth:`decode_payload`, and of the first that each writer protects."""
         pair = self._payload_pair(writer)
         if pair is None:
             return payload
@@ -249,9 +263,12 @@ class Protection:
         assert isinstance(remote, DatawriterCryptoHandle)
         if not len(payload):
             return payload if pair.participant.data.vendor_id in _ENDS_BY_HASH_ALONE else _UNPROVEN_END
-        if len(payload) < _SMALL:
-            payload = bytes(payload)
-        return self._cryptographic.decode_serialized_payload(payload, b"", local, remote)
+        plain = self._cryptographic.decode_serialized_payload(payload, b"", local, remote)
+        if self._short_ways is not None and not isinstance(plain, Outcome):
+            opener = self._short_ways.payload_opener(payload, remote)
+            if opener is not None:
+                self._payload_openers[writer] = bytes(payload[:_PAYLOADS_ALIKE]), opener
+        return plain
 
     def protects_payload(self, writer: Guid) -> bool:
         return self._payload_pair(writer) is not None

@@ -12,7 +12,6 @@ the DATA submessage could not be told from a signed payload else.
 
 from __future__ import annotations
 
-import struct
 from hmac import compare_digest
 from typing import Final
 
@@ -32,7 +31,6 @@ _LONGEST_PADDING: Final = 3
 _NO_MACS: Final = bytes(4)
 _FOOTER_LENGTH: Final = MAC_LENGTH + len(_NO_MACS)
 _CONTENT_AT: Final = HEADER_LENGTH + 4
-_USUAL_HEAD: Final = struct.Struct(">4s4s12sI")
 
 USED_UP: Final = Refused("the key is used up: all its session ids are spent")
 
@@ -73,10 +71,6 @@ def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -
 
     ``expected``: what the reader's attributes ask for; None takes what the key says.
     """
-    if expected is not None and len(octets) < LARGE:
-        plain = _open_usual(bytes(octets), ring, expected)
-        if plain is not None:
-            return plain
     octets = bytes(octets) if len(octets) < LARGE else memoryview(octets)
     if len(octets) < HEADER_LENGTH + _FOOTER_LENGTH:
         return Rejected(f"a protected payload of {len(octets)} octets")
@@ -92,32 +86,6 @@ def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -
         except MalformedMessage as error:
             return Rejected(str(error))
     return Rejected("the MAC of the payload is wrong")
-
-
-def _open_usual(octets: bytes, ring: KeyRing, expected: Protection) -> bytes | None:
-    """The short way of what nearly all protected payloads are: encrypted, without padding behind them, under a key and
-    in a session that were used before.  None: :func:`_open` knows, which does the same for all others.
-    """
-    length = len(octets)
-    if length < _CONTENT_AT + _FOOTER_LENGTH:
-        return None
-    kind_octets, key_id, nonce, count = _USUAL_HEAD.unpack_from(octets)
-    keys = ring.by_id.get(key_id)
-    if (
-        count != length - _CONTENT_AT - _FOOTER_LENGTH
-        or octets[-4:] != _NO_MACS
-        or keys is None
-        or ring.previous is not None
-    ):
-        return None
-    key = keys[0]
-    session = key.sessions.get(nonce[:4])
-    if session is None or key.kind_octets != kind_octets or not key.encrypts or not expected.encrypted:
-        return None
-    try:
-        return session.aead.decrypt(nonce, octets[_CONTENT_AT:-4], None)
-    except InvalidTag:
-        return None
 
 
 def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey, scratch: Scratch) -> bytes | memoryview:

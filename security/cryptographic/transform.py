@@ -15,7 +15,7 @@ from ddsi.structure.errors import MalformedMessage
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
-from . import envelope, opening, payload, sealing, submessage_opener
+from . import envelope, openers, opening, payload, sealing
 from .crypto_handles import (
     NO_KEY,
     LocalParticipant,
@@ -190,7 +190,16 @@ class AesGcmGmacTransform:
         sender = sending_crypto
         assert isinstance(sender, RemoteWriter | RemoteReader)
         expected = sender.reader.submessage if isinstance(sender, RemoteWriter) else sender.writer.submessage
-        opener = submessage_opener.submessage_opener(encoded_rtps_submessage, sender.ring, expected)
+        opener = openers.submessage_opener(encoded_rtps_submessage, sender.ring, expected)
+        return None if opener is None else opener.open
+
+    def payload_opener(
+        self, encoded_buffer: Octets, sending_datawriter_crypto: DatawriterCryptoHandle
+    ) -> Callable[[Octets], Octets | None] | None:
+        """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.OpensAlike`."""
+        sender = sending_datawriter_crypto
+        assert isinstance(sender, RemoteWriter)
+        opener = openers.payload_opener(encoded_buffer, sender.payload_ring, sender.reader.payload)
         return None if opener is None else opener.open
 
     def decode_serialized_payload(

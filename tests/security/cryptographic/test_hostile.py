@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from ddsi.spi import NOT_FOR_US, NoKeys, NotForUs, Octets, Outcome, Rejected
 from ddsi_security.cryptographic import opening, payload
 from ddsi_security.cryptographic.aes_gcm import LARGE
+from ddsi_security.cryptographic.openers import payload_opener, submessage_opener
 from ddsi_security.cryptographic.sealing import seal_message, seal_submessage
-from ddsi_security.cryptographic.submessage_opener import submessage_opener
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from tests.security.cryptographic import vectors
 from tests.security.cryptographic.keys import (
@@ -159,16 +159,19 @@ def test_the_short_way_opens_what_the_general_one_opens(data: st.DataObject) -> 
 def test_the_short_way_of_payloads_opens_what_the_general_one_opens(data: st.DataObject) -> None:
     keys, expected = ring(material(GCM)), Protection(encrypted=True)
     genuine = vectors.PAYLOAD_ENCRYPTED_256
-    assert payload._open_usual(genuine, keys, expected) is None, "its session is new"
+    assert payload_opener(genuine, keys, expected) is None, "its session is new"
     assert payload.decode_payload(genuine, keys, expected) == vectors.PAYLOAD
-    assert payload._open_usual(genuine, keys, expected) == vectors.PAYLOAD
+    opener = payload_opener(genuine, keys, expected)
+    assert opener is not None
+    assert opener.open(genuine) == vectors.PAYLOAD
     mutant = bytearray(genuine)
     for _ in range(data.draw(st.integers(1, 3))):
         start = data.draw(st.integers(0, len(mutant)))
         end = min(start + data.draw(st.integers(0, 8)), len(mutant))
         mutant[start:end] = data.draw(st.binary(max_size=8) | st.just(bytes(mutant[start:end] * 2)))
-    short = payload._open_usual(bytes(mutant), keys, expected)
-    assert short is None or short == payload.decode_payload(bytes(mutant), keys, None)
+    if mutant[:12] == genuine[:12]:
+        short = opener.open(bytes(mutant))
+        assert short is None or short == payload.decode_payload(bytes(mutant), keys, None)
 
 
 @given(st.binary(max_size=300))

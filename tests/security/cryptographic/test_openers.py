@@ -1,4 +1,4 @@
-"""The short way of protected submessages: it opens what the general way opens, and touches nothing else."""
+"""The short ways: each opens what its general way opens, and touches nothing else."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import struct
 import pytest
 
 from ddsi_security.cryptographic.aes_gcm import LARGE
+from ddsi_security.cryptographic.openers import SubmessageOpener, payload_opener, submessage_opener
 from ddsi_security.cryptographic.opening import open_submessage
+from ddsi_security.cryptographic.payload import decode_payload, encode_payload
 from ddsi_security.cryptographic.received_keys import KeyRing
 from ddsi_security.cryptographic.sealing import seal_submessage
 from ddsi_security.cryptographic.session_keys import SendingKey
-from ddsi_security.cryptographic.submessage_opener import SubmessageOpener, submessage_opener
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from tests.security.cryptographic.keys import material, ring, sending_key
 
@@ -107,3 +108,39 @@ def test_there_is_none_for_what_is_signed() -> None:
     keys, signed = ring(of), sealed(submessage(24), sending_key(of))
     assert open_submessage(signed, keys, Protection(encrypted=False)) == submessage(24)
     assert submessage_opener(signed, keys, Protection(encrypted=False)) is None
+
+
+# --- payloads --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("kind", [bytes, bytearray, lambda octets: memoryview(bytearray(octets)), memoryview])
+def test_payloads_are_opened_in_the_same_session(size: int, kind: type) -> None:
+    keys, key = ring(material()), sending_key()
+    first, second = protected_payload(b"1234", key), protected_payload(bytes(size), key)
+    assert decode_payload(first, keys, ENCRYPTED) == b"1234"
+    opener = payload_opener(first, keys, ENCRYPTED)
+    assert opener is not None
+    found = opener.open(kind(second))
+    assert found is not None
+    assert bytes(found) == bytes(size)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("at", [8, 20, 23, 24, -21, -20, -5, -1])
+def test_altered_payloads_are_left_to_the_general_way(size: int, at: int) -> None:
+    keys, key = ring(material()), sending_key()
+    first, altered = protected_payload(b"1234", key), bytearray(protected_payload(bytes(size), key))
+    decode_payload(first, keys, ENCRYPTED)
+    opener = payload_opener(first, keys, ENCRYPTED)
+    assert opener is not None
+    altered[at] ^= 1
+    assert opener.open(bytes(altered)) is None
+    for length in (0, 12, 24, 43):
+        assert opener.open(bytes(altered[:length])) is None
+
+
+def protected_payload(plain: bytes, key: SendingKey) -> bytes:
+    buffer = bytearray()
+    assert encode_payload(buffer, plain, key) is None
+    return bytes(buffer)

@@ -1,8 +1,9 @@
-"""The short way of a protected submessage: what a sender protects as it did before is opened as it was before.
+"""The short ways of protected submessages and payloads: what is protected as it was before is opened as it was before.
 
-DDS-Security 1.1 §9.5.3.3 (decode_datawriter_submessage, decode_datareader_submessage).  Whose submessage it is, under
-which key and in which session, its first 16 octets tell, and nearly all of one sender begin with the same ones.
-:mod:`.opening` is the general way, which opens the first; a test holds both against each other.
+DDS-Security 1.1 §9.5.3.3 (decode_datawriter_submessage, decode_datareader_submessage, decode_serialized_payload).
+Under which key and in which session something was protected its first octets tell, and nearly all of one sender begin
+with the same ones.  :mod:`.opening` and :mod:`.payload` are the general ways, which open the first; tests hold each
+pair against each other.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from ddsi.spi import Octets
 
 from .aes_gcm import LARGE, Scratch, decrypt_sealed
 from .envelope import ENVELOPE_KINDS, HEAD, SUBMESSAGE, body_head
-from .received_keys import KeyRing
-from .transformation import MAC_LENGTH, Protection
+from .received_keys import KeyRing, ReceivedSession
+from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
 
-__all__ = ["SubmessageOpener", "submessage_opener"]
+__all__ = ["PayloadOpener", "SubmessageOpener", "payload_opener", "submessage_opener"]
 
 _NONCE_AT: Final = 12
 _BODY_AT: Final = 24
@@ -33,6 +34,11 @@ _POSTFIX_HEAD: Final = SUBMESSAGE.postfix_head
 _NO_MACS: Final = bytes(4)
 _LEAST: Final = _CONTENT_AT + 4 + _FOOT
 """Octets around the content of a submessage, and its header."""
+
+
+_PAYLOAD_NONCE_AT: Final = 8
+_PAYLOAD_CONTENT_AT: Final = HEADER_LENGTH + 4
+_PAYLOAD_FOOT: Final = MAC_LENGTH + len(_NO_MACS)
 
 
 class SubmessageOpener:
@@ -103,18 +109,54 @@ def _layout(length: int) -> tuple[Callable[[bytes], tuple[bytes, ...]], bytes]:
     return parts.unpack, b"" if length & 3 else body_head(content)
 
 
+class PayloadOpener:
+    """For payloads that begin with the same 12 octets: encrypted, in one session."""
+
+    __slots__ = ("_aead", "_decrypt", "_scratch")
+
+    def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
+        self._aead = aead
+        self._decrypt = aead.decrypt
+        self._scratch = scratch
+
+    def open(self, octets: Octets) -> Octets | None:
+        """The payload in ``octets``, behind which is no padding; else None, also where they were altered."""
+        length = len(octets)
+        content = int.from_bytes(octets[HEADER_LENGTH:_PAYLOAD_CONTENT_AT], "big")
+        if content != length - _PAYLOAD_CONTENT_AT - _PAYLOAD_FOOT or octets[-4:] != _NO_MACS:
+            return None
+        nonce, sealed = octets[_PAYLOAD_NONCE_AT:HEADER_LENGTH], octets[_PAYLOAD_CONTENT_AT:-4]
+        try:
+            if length < LARGE:
+                return self._decrypt(nonce, sealed, None)
+            return decrypt_sealed(self._aead, bytes(nonce), sealed, self._scratch)
+        except InvalidTag:
+            return None
+
+
 def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> SubmessageOpener | None:
     """Opens what begins as ``octets``, which were opened with this ring; None where the usual form is not expected.
 
     It holds until the ring changes.
     """
-    head, kind_octets, key_id, session_id = (bytes(octets[at : at + 4]) for at in (0, 4, 8, 12))
+    session = _session(octets[4:16], ring, expected)
+    if session is None or octets[:4] != SUBMESSAGE.prefix_head:
+        return None
+    return SubmessageOpener(session.aead, ring.scratch)
+
+
+def payload_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> PayloadOpener | None:
+    """As :func:`submessage_opener`, of a payload."""
+    session = _session(octets[:12], ring, expected)
+    return None if session is None else PayloadOpener(session.aead, ring.scratch)
+
+
+def _session(octets: Octets, ring: KeyRing, expected: Protection | None) -> ReceivedSession | None:
+    """By transformation kind, key id and session id: of the ring's only key, if that encrypts as it should."""
+    kind_octets, key_id, session_id = (bytes(octets[at : at + 4]) for at in (0, 4, 8))
     keys = ring.by_id.get(key_id)
     if expected is None or not expected.encrypted or expected.origin_authenticated or ring.previous is not None:
         return None
-    if head != SUBMESSAGE.prefix_head or keys is None:
+    if keys is None or keys[0].kind_octets != kind_octets or not keys[0].encrypts:
         return None
-    session = keys[0].sessions.get(session_id)
-    if session is None or keys[0].kind_octets != kind_octets or not keys[0].encrypts:
-        return None
-    return SubmessageOpener(session.aead, ring.scratch)
+    return keys[0].sessions.get(session_id)
