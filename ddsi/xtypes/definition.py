@@ -96,7 +96,7 @@ def _slotted(python_class: type[Any]) -> type[Any]:
     own_equality = "__eq__" in python_class.__dict__
     try:
         decorated: type[Any] = dataclasses.dataclass(slots=True, eq=False)(python_class)
-    except (TypeError, ValueError) as error:
+    except Exception as error:  # most often TypeError, but a metaclass, such as that of enums, may fail as it likes
         raise BadParameter(f"{python_class.__name__}: {error}") from error
     if not own_equality:
         # Not the dataclass's own: it compares an array.array with a list as different, and fails on numpy arrays.

@@ -100,6 +100,8 @@ class Resolver:
             return self._optional(typing.get_args(annotation))
         if isinstance(annotation, str):
             raise BadParameter(f"{annotation!r} is no type")
+        if origin in (*_SEQUENCES, *_MAPS) and not typing.get_args(annotation):  # typing.List and its like, bare
+            raise BadParameter(_why_not(annotation, origin))
         if origin in _SEQUENCES:
             element = self._element(typing.get_args(annotation)[0], "sequence")
             return Resolved(SequenceType(element.type), typedefs=_of_parts(element.typedefs))
@@ -294,9 +296,13 @@ def _why_not(annotation: Any, origin: Any) -> str:
     shown = getattr(annotation, "__name__", None) or repr(annotation)
     if annotation is int:
         return "int does not say its width; use idl.int32 or another of idl's integers"
-    if annotation in _MAPS:
+    if annotation is Any:
+        return "Any says no type"
+    if isinstance(annotation, typing.TypeVar):
+        return f"{shown} is a type variable, and an IDL type has none"
+    if annotation in _MAPS or origin in _MAPS:
         return f"{shown} does not say of what; use idl.map[key, value]"
-    if annotation in _SEQUENCES:
+    if annotation in _SEQUENCES or origin in _SEQUENCES:
         return f"{shown} does not say of what; use idl.sequence[...]"
     if tuple in (annotation, origin):
         return "a tuple is no IDL type; use idl.sequence[...], with idl.array(n) for a fixed number of elements"

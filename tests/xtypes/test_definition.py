@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import re
+import typing
 from array import array
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field, fields
@@ -143,6 +144,23 @@ def test_member_ids_go_on_from_the_one_before() -> None:
     assert Derived(1, 2, 3, 4, 5, 6).a == 1
 
 
+def test_generics_of_typing_are_those_of_the_language() -> None:
+    @idl.struct
+    class Old:
+        numbers: typing.List[idl.int8]  # noqa: UP006
+        names: typing.Dict[str, idl.int8]  # noqa: UP006
+        maybe: typing.Optional[typing.Sequence[str]]  # noqa: UP045
+        other: typing.Union[idl.int8, None]  # noqa: UP007
+
+    assert [str(type_) for type_ in types_of(Old)] == [
+        "sequence<int8>",
+        "map<string, int8>",
+        "sequence<string>",
+        "int8",
+    ]
+    assert [member.is_optional for member in struct_type(Old).members] == [False, False, True, True]
+
+
 def test_local_classes_may_name_each_other_and_themselves() -> None:
     @idl.struct
     class Tree:
@@ -213,6 +231,13 @@ MEMBERS: dict[str, tuple[Any, str]] = {
     "union": (str | float, "a choice of types is an IDL union: a class decorated with @idl.union"),
     "tuple": (tuple[float, ...], "a tuple is no IDL type"),
     "bare list": (list, "does not say of what"),
+    "bare list of typing": (typing.List, "List does not say of what; use idl.sequence[...]"),  # noqa: UP006
+    "bare map of typing": (typing.Dict, "Dict does not say of what; use idl.map[key, value]"),  # noqa: UP006
+    "any": (Any, "Any says no type"),
+    "type variable": (typing.TypeVar("T"), "T is a type variable, and an IDL type has none"),
+    "set": (set[int], "set is no IDL type"),
+    "literal": (typing.Literal[1], "Literal is no IDL type"),
+    "complex": (complex, "complex is no IDL type"),
     "enum": (Untitled, "IDL enums are enum.IntEnum"),
     "wide enum": (Large, "Large.A: 2147483648 does not fit 32 bits"),
     "bound on int": (Annotated[idl.int32, idl.bound(3)], "idl.bound fits strings, sequences and maps, not int32"),
@@ -312,6 +337,19 @@ def _positional_name() -> None:
     idl.struct("name")  # type: ignore[call-overload]
 
 
+def _enumeration() -> None:
+    @idl.struct
+    class Wrong(enum.Enum):
+        a: idl.int8 = 1  # type: ignore[misc]
+
+
+def _own_slots() -> None:
+    @idl.struct
+    class Wrong:
+        __slots__ = ("a",)
+        a: idl.int8
+
+
 def _bit_bound() -> None:
     idl.enum(bit_bound=33)(Large)
 
@@ -332,6 +370,8 @@ def _no_default_literal() -> None:
         (_unfit_default, "Wrong: the default of a: 300 does not fit int8 (-128 to 127)"),
         (_order_of_defaults, "Wrong: non-default argument 'b' follows default argument"),
         (_extensibility, "Wrong: extensibility is idl.FINAL"),
+        (_enumeration, "Wrong: "),
+        (_own_slots, "Wrong: Wrong already specifies __slots__"),
         (_positional_name, "idl.struct decorates a class, not 'name'"),
         (_bit_bound, "Large: bit_bound is a number from 1 to 32, not 33"),
         (_no_default_literal, "Large: the default 'B' is none of its literals"),
