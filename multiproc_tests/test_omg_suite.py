@@ -30,6 +30,9 @@ QUICK_AMONG_OURS = (
     "Ownership_3",
     "Deadline_3",
     "Cft_1",
+    "OrderedAccess_5",
+    "CoherentSets_11",
+    "CoherentSets_21",
 )
 QUICK_WITH_CYCLONE = (
     "DataRepresentation_0",
@@ -38,6 +41,7 @@ QUICK_WITH_CYCLONE = (
     "Durability_7",
     "Durability_17",
     "LargeData_0",
+    "CoherentSets_8",
 )
 
 

@@ -61,6 +61,8 @@ def main(words: Sequence[str] | None = None) -> int:
 async def _play(options: ShapeMainOptions) -> int:
     """Until all rounds are played, or a signal asks for the end: then what is under way is finished and said."""
     end = trio.Event()
+    # What the suite asks for at the end may come once more while the interpreter is being cleared up: it has been done.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with trio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async with trio.open_nursery() as nursery:
             nursery.start_soon(_end_on_signal, signals, end)
