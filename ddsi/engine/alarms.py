@@ -38,6 +38,7 @@ class Timer(Enum):
     REMOTE_LIVELINESS = "a remote writer's liveliness lease"
     FLUSH = "queued samples must leave"
     LINGER = "a closed writer has waited long enough for acknowledgment"
+    ANNOUNCE = "an endpoint that withdrew what its type is made of is announced again"
     TYPE_LOOKUP = "a participant was asked about types, and has not answered"
     SECURITY = "the hooks asked to be called"
 
@@ -115,6 +116,9 @@ class Alarms:
     def linger(self, writer: Guid, deadline: float) -> None:
         self._timers.set((Timer.LINGER, writer), deadline)
 
+    def announce_endpoint(self, guid: Guid, deadline: float) -> None:
+        self._timers.set((Timer.ANNOUNCE, guid), deadline)
+
     def type_lookup(self, prefix: bytes, deadline: float) -> None:
         self._timers.set((Timer.TYPE_LOOKUP, prefix), deadline)
 
@@ -156,6 +160,8 @@ class Alarms:
                 engine.liveliness.remote_writer_due(subjects[0], now)
             case Timer.FLUSH:
                 engine.flush()
+            case Timer.ANNOUNCE:
+                engine.discovery.announce_again(subjects[0], now)
             case Timer.TYPE_LOOKUP:
                 engine.types.answer_overdue(subjects[0], now)
             case Timer.SECURITY:

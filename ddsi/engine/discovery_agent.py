@@ -53,6 +53,9 @@ __all__ = ["DiscoveryAgent"]
 
 _KEEP_FAREWELLS_S = 600.0
 _MAX_FAREWELLS = 8192
+_GONE_S = 0.3
+"""How long an endpoint stays away.  Cyclone DDS forgets one a moment after it was told so, and would forget the new one
+of the same Guid with it; and it is the time that others have to ask for what was lost."""
 
 
 class DiscoveryAgent:
@@ -374,19 +377,24 @@ class DiscoveryAgent:
     def withdraw_types(self, endpoint: LocalWriter | LocalReader, now: float) -> None:
         """From now on the endpoint says nothing of what its type is made of, so that peers go by the type's name.
 
-        Peers take no change of that of an endpoint that they know; so it is gone, and is there again.  The dispose must
-        not be replaced in the history by what follows: it counts as another instance there.
+        Peers take no change of that of an endpoint that they know; so it is gone, and in a moment there again.
         """
         if not endpoint.data.type_information:
             return
-        guid, writer_id = endpoint.guid, _sedp_writer(endpoint)
-        self._announce_gone(writer_id, guid, now, key=guid + b"type")
         if isinstance(endpoint, LocalWriter):
             endpoint.data = replace(endpoint.data, type_information=b"")
-            self.announce_writer(endpoint, now)
         else:
             endpoint.data = replace(endpoint.data, type_information=b"")
-            self.announce_reader(endpoint, now)
+        self.announce_gone(endpoint, now)
+        self._engine.alarms.announce_endpoint(endpoint.guid, now + _GONE_S)
+
+    def announce_again(self, guid: Guid, now: float) -> None:
+        """An endpoint that was gone for a moment is there, unless it has been deleted meanwhile."""
+        writer, reader = self._engine.local_writers.get(guid), self._engine.local_readers.get(guid)
+        if writer is not None and guid not in self._engine.closing:
+            self.announce_writer(writer, now)
+        elif reader is not None:
+            self.announce_reader(reader, now)
 
     def announce_gone(self, endpoint: LocalWriter | LocalReader, now: float) -> None:
         self._announce_gone(_sedp_writer(endpoint), endpoint.guid, now)
@@ -395,12 +403,10 @@ class DiscoveryAgent:
         self._prune_farewells(now)
         self._engine.write_builtin(writer_id, ChangeKind.ALIVE, payload, guid, now)
 
-    def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float, *, key: bytes = b"") -> None:
+    def _announce_gone(self, writer_id: EntityId, guid: Guid, now: float) -> None:
         self._prune_farewells(now)
-        engine, kind = self._engine, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED
         payload = encode_key(guid, ParameterId.ENDPOINT_GUID)
-        writer = engine.local_writers[Guid.of(engine.guid.prefix, writer_id)]
-        change = engine.write(writer, kind, payload, key or guid, now, key_hash=guid)
+        change = self._engine.write_builtin(writer_id, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, payload, guid, now)
         self._farewells.append((now, writer_id, change.sequence_number))
 
     def _prune_farewells(self, now: float) -> None:
