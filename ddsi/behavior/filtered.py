@@ -8,8 +8,8 @@ sent.  Each reader has a HEARTBEAT of its own, under its own key, that speaks of
 ``lst_seq``, so a reader that has all of its samples is never asked again because somebody else lacks one.
 
 Here are pure functions over a WriterHistoryCache and a ReaderProxy; :mod:`ddsi.behavior.filtering_writer` is the
-writer that uses them, and :mod:`ddsi.behavior.content_filtering_writer` the one for content filters.  On the reader's side nothing is special but that
-numbers which are skipped are no loss (``WriterProxy.uses_filter``).
+writer that uses them, and :mod:`ddsi.behavior.content_filtering_writer` the one for content filters.  On the reader's
+side nothing is special but that numbers which are skipped are no loss (``WriterProxy.uses_filter``).
 """
 
 from __future__ import annotations
