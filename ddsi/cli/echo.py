@@ -60,7 +60,8 @@ class _Echo(TopicSession):
                     await self._print_samples(participant, nursery)
                     nursery.cancel_scope.cancel()
         if self._received < (wanted or 1):
-            self.notice(f"{self._received} of {wanted or 'any'} samples came in {timeout:g} s")
+            came = f"{self._received} of {wanted} samples" if wanted else "nothing"
+            self.notice(f"{came} came in {timeout:g} s")
             return ExitStatus.NOT_AS_HOPED
         return ExitStatus.OK
 

@@ -63,6 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 class _Publication(TopicSession):
+    seeks = "reader"
+
     def __init__(self, arguments: argparse.Namespace) -> None:
         super().__init__(arguments, "ddsi pub")
         self._form = typed_form(arguments.values)

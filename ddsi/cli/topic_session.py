@@ -125,7 +125,9 @@ def _types_of(namespace: Any) -> Iterator[tuple[str, type[Any]]]:
 
 
 class TopicSession:
-    """One run of such a command: ``command`` is its name, ``kind`` whom it looks for."""
+    """One run of such a command; ``seeks`` says of whom."""
+
+    seeks = "writer"
 
     def __init__(self, arguments: argparse.Namespace, command: str) -> None:
         self.arguments = arguments
@@ -146,7 +148,7 @@ class TopicSession:
         """The type that was given, or else the one that others tell of; waited for as long as it takes."""
         if self._loaded is not None:
             return self._loaded
-        async with self._patience(participant):
+        async with self._patience(participant, "and is asked what it is made of"):
             try:
                 return await participant.discover_type(self.topic, timeout=None)
             except PreconditionNotMet as error:
@@ -163,21 +165,21 @@ class TopicSession:
         def there() -> list[EndpointQos]:
             return [peer.qos for peer in of() if peer.topic_name == self.topic and peer.type_name == type_name]
 
-        async with self._patience(participant):
+        async with self._patience(participant, f"but a {self.seeks} of {shown(type_name)!r} is wanted"):
             while len(there()) < least:
                 await participant.wait_for_discovery()
         await trio.sleep(_SETTLING_S)
         return there()
 
     @asynccontextmanager
-    async def _patience(self, participant: DomainParticipant) -> AsyncIterator[None]:
-        """After a while without what is looked for, say that it is."""
+    async def _patience(self, participant: DomainParticipant, otherwise: str) -> AsyncIterator[None]:
+        """After a while without what is looked for, say so; ``otherwise`` is what to say of others that are there."""
 
         async def say() -> None:
             await trio.sleep(_PATIENCE_S)
-            known = [*participant.discovered_publications(), *participant.discovered_subscriptions()]
-            others = [f"{peer.type_name!r}" for peer in known if peer.topic_name == self.topic]
-            there = f"there are others, of the type {shown(others[0])}" if others else "nobody is there yet"
+            known: list[Peer] = [*participant.discovered_publications(), *participant.discovered_subscriptions()]
+            others = [peer for peer in known if peer.topic_name == self.topic]
+            there = f"{_described(others[0])} is there, {otherwise}" if others else "nobody is there yet"
             self.notice(f"{there}; waiting (Ctrl+C ends, `ddsi ls endpoints` shows what there is)")
 
         async with trio.open_nursery() as nursery:
@@ -219,6 +221,11 @@ class TopicSession:
                 except DdsError as error:
                     self.notice(str(error))
                 current = partition
+
+
+def _described(peer: Peer) -> str:
+    kind = "writer" if isinstance(peer, DiscoveredWriterData) else "reader"
+    return f"a {kind} of {shown(peer.type_name)!r}"
 
 
 def _event_text(event: Status) -> str:
