@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from ddsi.discovery.matching import judge
 from ddsi.engine import SendDatagram
-from ddsi.simulation import Domain, NodeReader, NodeWriter
+from ddsi.simulation import Domain, LinkConditions, NodeReader, NodeWriter
 from ddsi.simulation.endpoints import payload_of
 from ddsi.structure.cache_change import ChangeKind
 from ddsi.structure.errors import ImmutablePolicy
@@ -285,3 +288,47 @@ def test_a_priority_marks_what_the_writer_sends_from_then_on() -> None:
     assert priorities() == {0}
     writer.change(KEPT | Qos(transport_priority=TransportPriority(46)))
     assert priorities() == {46}
+
+
+# --- whatever changes in whatever order ----------------------------------------------------------------------------
+
+_PARTITIONS = st.sampled_from([(), ("a",), ("b",), ("a*",), ("a", "b"), ("?",)])
+_POLICIES = st.builds(
+    lambda names, period, budget: Qos(
+        partition=Partition(*names), deadline=Deadline(period), latency_budget=LatencyBudget(budget)
+    ),
+    _PARTITIONS, st.sampled_from([5.0, 10.0, 20.0]), st.sampled_from([0.0, 0.0, 1.0]),
+)  # fmt: skip
+_CHANGES = st.lists(st.tuples(st.integers(0, 3), _POLICIES, st.sampled_from([0.0, 0.003, 0.3])), max_size=12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(changes=_CHANGES, seed=st.integers(0, 1000))
+def test_in_the_end_those_are_matched_that_fit_and_samples_reach_them(
+    changes: list[tuple[int, Qos, float]], seed: int
+) -> None:
+    """In bad weather: two writers and two readers, of which one pair is of one participant, change while they meet."""
+    domain = Domain(seed, conditions=LinkConditions(loss=0.1, reordering=0.1, duplication=0.05, jitter=0.001))
+    nodes = [domain.node() for _ in range(3)]
+    writers = [node.writer("Square", KEPT, keyed=True) for node in nodes[:2]]
+    readers = [node.reader("Square", KEPT, keyed=True) for node in nodes[1:]]
+    endpoints: list[NodeWriter | NodeReader] = [*writers, *readers]
+    for who, policies, pause in changes:
+        endpoints[who].change(KEPT | policies)
+        domain.run(pause)
+    domain.run(10.0)
+    for writer in writers:
+        fitting = {reader.guid for reader in readers if judge(writer.local.data, reader.local.data) is None}
+        assert {*writer.local.behavior.readers, *writer.local.behavior.local_readers} == fitting
+        assert writer.matched_count == len(fitting)
+    for reader in readers:
+        fitting = {writer.guid for writer in writers if judge(writer.local.data, reader.local.data) is None}
+        assert reader.local.behavior.writers.keys() == fitting
+        assert reader.matched_count == reader.local.liveliness.alive_count == len(fitting)
+        reader.taken.clear()
+    written = {writer.guid: writer.write() for writer in writers}
+    domain.run(5.0)
+    for reader in readers:
+        taken = {change.writer_guid: change.sequence_number for info, change in reader.taken if info.valid_data}
+        expected = {guid: written[guid] for guid in reader.local.behavior.writers}
+        assert taken == {guid: change.sequence_number for guid, change in expected.items() if change is not None}
