@@ -299,7 +299,7 @@ async def test_why_names_policy_values_and_remedy() -> None:
     (mismatch,) = json.loads("\n".join(machine))["mismatches"]
     assert (mismatch["topic"], mismatch["kind"]) == ("Square", "qos")
     assert [one["policy"] for one in mismatch["disagreements"]] == ["reliability", "durability"]
-    assert {*mismatch["disagreements"][0]} == {"policy", "offered", "requested", "remedy"}
+    assert {*mismatch["disagreements"][0]} == {"policy", "offered", "requested", "detail", "remedy"}
     assert mismatch["writer"]["entity_name"] == "ddsi shapes pub"
     assert "Nobody was seen with a writer or reader of Circle" in other[0]
 

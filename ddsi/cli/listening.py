@@ -17,9 +17,9 @@ _LOOK_S = 0.05
 
 
 @asynccontextmanager
-async def observer(domain_id: int, name: str) -> AsyncIterator[DomainParticipant]:
-    """A participant that announces itself under the command's name: who looks is seen too."""
-    async with DomainParticipant(domain_id, qos=Qos(entity_name=name)) as participant:
+async def observer(domain_id: int, qos: Qos) -> AsyncIterator[DomainParticipant]:
+    """A participant; ``qos`` has the command's name, which it announces: who looks is seen too."""
+    async with DomainParticipant(domain_id, qos=qos) as participant:
         yield participant
 
 

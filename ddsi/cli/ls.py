@@ -11,6 +11,7 @@ from typing import get_args
 import trio
 
 from ..dcps import DomainParticipant
+from ..structure.qos import Qos
 from .arguments import add_domain, add_json, add_listening
 from .census import Census, Selection, take_census
 from .census_changes import changes
@@ -66,7 +67,7 @@ class _Listing:
 
     async def run(self) -> int:
         arguments = self._arguments
-        async with observer(arguments.domain, "ddsi ls") as participant:
+        async with observer(arguments.domain, Qos(entity_name="ddsi ls")) as participant:
             if not arguments.watch:
                 await listen(participant, arguments.time)
                 print("\n".join(self._lines(participant)))

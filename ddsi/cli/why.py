@@ -1,45 +1,54 @@
-"""``ddsi why``: why do these two not match?  Policy, both values and the remedy, for every pair that was seen.
+"""``ddsi why``: why do these two not match?  Every cause at once, both values and the remedy, for every pair seen.
 
-It judges what participants announce, as this implementation's own endpoints would.  Types that both sides announce are
-fetched and compared; others go by name and key.
+It judges what participants announce, as this implementation's own endpoints would: it prints what
+``DomainParticipant.explain`` returns.
 """
 
 from __future__ import annotations
 
 import argparse
-import difflib
 import json
+import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
-from itertools import islice
 
+import trio
+
+from ..dcps import DomainParticipant
+from ..discovery.explanation import Explanation, PairExplanation, ParticipantTrouble
+from ..discovery.remedies import Disagreement
 from ..structure.guid import Guid
 from ..trace.wording import count_text
 from .arguments import add_domain, add_json, add_listening
-from .census import Census, EndpointKind, Pair, SeenParticipant, take_census
+from .census import Census, SeenParticipant, take_census
 from .census_tables import who
 from .exit_status import ExitStatus
 from .listening import listen, observer
-from .remedies import Disagreement, disagreements
 from .runner import run as run_async
 from .tables import shown
-from .type_judgements import TypeJudgements, judge_types, with_types
+from .topic_session import add_security, participant_qos
 
-__all__ = ["SUMMARY", "Diagnosis", "Lonely", "Mismatch", "add_arguments", "diagnose", "run"]
+__all__ = ["SUMMARY", "add_arguments", "run"]
 
 SUMMARY = "say why endpoints of a topic do not match, and what to do"
 
-_MOST_SIMILAR = 3
 _MOST_NAMED = 4
-_MOST_COMPARED = 20_000
-"""Names compared with names, in all: it takes a tenth of a millisecond each."""
+_TYPES_S = 4.0
+"""How long to wait for what others' types are made of: longer than their participants are asked for them."""
+_GUID = re.compile(r"(?:[0-9a-f]{8}:){3}[0-9a-f]{8}|[0-9a-f]{32}", re.IGNORECASE)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("topic", nargs="?", default="", metavar="TOPIC", help="only this topic (a shell pattern)")
+    parser.add_argument(
+        "asked",
+        nargs="*",
+        default=[],
+        metavar="TOPIC | GUID...",
+        help="only this topic (a shell pattern), this endpoint, or these endpoints with each other; GUIDs as "
+        "`ddsi ls --json` prints them",
+    )
     add_domain(parser)
     add_listening(parser)
+    add_security(parser)
     add_json(parser)
 
 
@@ -48,151 +57,111 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _explain(arguments: argparse.Namespace) -> int:
-    async with observer(arguments.domain, "ddsi why") as participant:
+    asked = [Guid(bytes.fromhex(one.replace(":", ""))) if _GUID.fullmatch(one) else str(one) for one in arguments.asked]
+    async with observer(arguments.domain, participant_qos(arguments, "ddsi why")) as participant:
+        participant.explain(*asked)  # what cannot be asked is refused before the listening
         await listen(participant, arguments.time)
+        explanation = await _with_types(participant, asked)
         census = take_census(participant)
-        judgements = await judge_types(participant, _asked(census, arguments.topic))
-    diagnosis = diagnose(census, arguments.topic, judgements)
     if arguments.json:
-        print(json.dumps(_diagnosis_json(diagnosis), indent=2))
+        print(json.dumps(_explanation_json(census, explanation), indent=2))
     else:
-        print("\n".join(_lines(diagnosis)))
-    return ExitStatus.NOT_AS_HOPED if diagnosis.mismatches or diagnosis.is_empty else ExitStatus.OK
+        print("\n".join(_lines(census, explanation)))
+    return ExitStatus.OK if _is_well(explanation) else ExitStatus.NOT_AS_HOPED
 
 
-@dataclass(frozen=True, slots=True)
-class Mismatch:
-    """A pair that does not match, with every reason."""
-
-    pair: Pair
-    disagreements: tuple[Disagreement, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Lonely:
-    """A topic of which only writers, or only readers, were seen; ``similar``: topics of the other kind named alike."""
-
-    topic: str
-    kind: EndpointKind
-    endpoints: tuple[Guid, ...]
-    similar: tuple[str, ...]
+async def _with_types(participant: DomainParticipant, asked: list[str | Guid]) -> Explanation:
+    """What is to be said, when everybody has told what types are made of, or had the time to."""
+    explanation = participant.explain(*asked)
+    with trio.move_on_after(_TYPES_S):
+        while not explanation.is_complete:
+            with trio.move_on_after(0.25):
+                await participant.wait_for_discovery()
+            explanation = participant.explain(*asked)
+    return explanation
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """``asked``: the pattern of topics, empty for all.  ``matching``: how many pairs fit."""
-
-    census: Census
-    asked: str
-    mismatches: tuple[Mismatch, ...]
-    lonely: tuple[Lonely, ...]
-    matching: int
-
-    @property
-    def is_empty(self) -> bool:
-        """Was the topic that was asked for not seen at all?"""
-        return bool(self.asked) and not (self.mismatches or self.lonely or self.matching)
+def _is_well(explanation: Explanation) -> bool:
+    is_cut_off = any(trouble.kind in ("unreachable", "silent") for trouble in explanation.troubles)
+    return not (explanation.mismatches or explanation.unknown or is_cut_off or _is_empty(explanation))
 
 
-def diagnose(census: Census, topic: str = "", judgements: TypeJudgements | None = None) -> Diagnosis:
-    """Everything that keeps endpoints of the topic (a shell pattern; empty for any) apart.
-
-    ``judgements``: what is known of their types besides names.
-    """
-    pairs = [with_types(pair, judgements or {}) for pair in _asked(census, topic)]
-    mismatches = tuple(
-        Mismatch(pair, disagreements(pair.writer, pair.reader, pair.refusal)) for pair in pairs if pair.refusal
-    )
-    lonely = tuple(found for found in _lonely(census) if not topic or fnmatchcase(found.topic, topic))
-    return Diagnosis(census, topic, mismatches, lonely, len(pairs) - len(mismatches))
-
-
-def _asked(census: Census, topic: str) -> Iterator[Pair]:
-    return (pair for pair in census.pairs() if not topic or fnmatchcase(pair.writer.topic_name, topic))
-
-
-def _lonely(census: Census) -> Iterator[Lonely]:
-    by_topic: dict[str, dict[EndpointKind, list[Guid]]] = {}
-    for _, endpoint in census.endpoints():
-        kinds = by_topic.setdefault(endpoint.data.topic_name, {})
-        kinds.setdefault(endpoint.kind, []).append(endpoint.data.guid)
-    lonely = sorted(topic for topic, kinds in by_topic.items() if len(kinds) == 1)
-    candidates: dict[EndpointKind, _Names] = {
-        "writer": _Names(topic for topic, kinds in by_topic.items() if "reader" in kinds),
-        "reader": _Names(topic for topic, kinds in by_topic.items() if "writer" in kinds),
-    }
-    for topic in lonely:
-        ((kind, guids),) = by_topic[topic].items()
-        similar = candidates[kind].similar(topic, _MOST_COMPARED // len(lonely))
-        yield Lonely(topic, kind, tuple(guids), similar)
-
-
-class _Names:
-    """Names that may have been meant: another case, a slip of the pen, a prefix such as that of ROS 2 (``rt/``)."""
-
-    def __init__(self, names: Iterable[str]) -> None:
-        self._by_plain: dict[str, list[str]] = {}
-        for name in names:
-            self._by_plain.setdefault(_plain(name), []).append(name)
-
-    def similar(self, topic: str, most_compared: int) -> tuple[str, ...]:
-        """The best few, of which those that differ in case or prefix alone come first."""
-        wanted = _plain(topic)
-        close = difflib.get_close_matches(wanted, islice(self._by_plain, most_compared), n=_MOST_SIMILAR)
-        found = [*self._by_plain.get(wanted, ()), *(name for plain in close for name in self._by_plain[plain])]
-        return tuple(dict.fromkeys(found))[:_MOST_SIMILAR]
-
-
-def _plain(name: str) -> str:
-    return name.lower().rpartition("/")[2]
+def _is_empty(explanation: Explanation) -> bool:
+    """Was what was asked for not seen at all?"""
+    return bool(explanation.asked) and not (explanation.pairs or explanation.lonely or explanation.unknown)
 
 
 # --- for people ------------------------------------------------------------------------------------------------
 
 
-def _lines(diagnosis: Diagnosis) -> Iterator[str]:
-    if diagnosis.is_empty:
-        asked = shown(diagnosis.asked)
+def _lines(census: Census, explanation: Explanation) -> Iterator[str]:
+    yield from _trouble_lines(census, explanation.troubles)
+    if _is_empty(explanation):
+        asked = " ".join(map(shown, explanation.asked))
         yield f"Nobody was seen with a writer or reader of {asked}; `ddsi ls topics` shows what there is."
         return
-    for group in _grouped(diagnosis.mismatches):
-        yield from _group_lines(diagnosis.census, group)
+    for guid in explanation.unknown:
+        yield f"{guid}: not discovered; `ddsi ls endpoints` shows who is there"
+        yield "    remedy: compare domain id, interfaces and multicast on both hosts (`ddsi doctor --peer HOST`)"
+    for group in _grouped(explanation.mismatches):
+        yield from _group_lines(census, group)
         yield ""
-    for lonely in diagnosis.lonely:
+    if explanation.asked:
+        for group in _grouped(pair for pair in explanation.pairs if not pair.disagreements):
+            yield from _group_lines(census, group)
+            yield ""
+    told = {name for pair in explanation.pairs for name in (pair.writer.topic_name, pair.reader.topic_name)}
+    lonely_topics = [lonely for lonely in explanation.lonely if lonely.topic not in told]
+    for lonely in lonely_topics:
         other = "reader" if lonely.kind == "writer" else "writer"
         names = " or ".join(shown(name) for name in lonely.similar)
         hint = f"; was {names} meant?" if names else ""
         yield f"{shown(lonely.topic)}: {count_text(len(lonely.endpoints), lonely.kind)}, but no {other} was seen{hint}"
-    if diagnosis.lonely:
+    if lonely_topics:
         yield ""
-    bad = len(diagnosis.mismatches)
-    fitting = count_text(diagnosis.matching, "pair")
+    bad = len(explanation.mismatches)
+    fitting = count_text(explanation.matching_count, "pair")
     yield f"{fitting} of a writer and a reader fit, {bad or 'none'} {'does' if bad == 1 else 'do'} not."
 
 
-def _grouped(mismatches: tuple[Mismatch, ...]) -> list[list[Mismatch]]:
+def _trouble_lines(census: Census, troubles: tuple[ParticipantTrouble, ...]) -> Iterator[str]:
+    for trouble in troubles:
+        of = f" of {_owner(census, trouble.guid)}" if trouble.guid is not None else ""
+        whom = f"participant {trouble.guid.prefix}{of}" if trouble.guid is not None else "somebody"
+        yield f"{whom}: {trouble.kind}: it announces {shown(trouble.offered)}; {shown(trouble.requested)}"
+        yield f"    remedy: {shown(trouble.remedy)}"
+    if troubles:
+        yield ""
+
+
+def _grouped(pairs: Iterable[PairExplanation]) -> list[list[PairExplanation]]:
     """Pairs with the same reasons are told of together: fifty readers of one kind have one problem."""
-    groups: dict[tuple[str, tuple[Disagreement, ...]], list[Mismatch]] = {}
-    for mismatch in mismatches:
-        groups.setdefault((mismatch.pair.writer.topic_name, mismatch.disagreements), []).append(mismatch)
+    groups: dict[tuple[str, str, tuple[Disagreement, ...], bool], list[PairExplanation]] = {}
+    for pair in pairs:
+        key = (pair.writer.topic_name, pair.reader.topic_name, pair.disagreements, pair.is_awaited)
+        groups.setdefault(key, []).append(pair)
     return list(groups.values())
 
 
-def _group_lines(census: Census, group: list[Mismatch]) -> Iterator[str]:
+def _group_lines(census: Census, group: list[PairExplanation]) -> Iterator[str]:
     first = group[0]
-    writers = list(dict.fromkeys(mismatch.pair.writer.guid for mismatch in group))
-    readers = list(dict.fromkeys(mismatch.pair.reader.guid for mismatch in group))
+    writers = list(dict.fromkeys(pair.writer.guid for pair in group))
+    readers = list(dict.fromkeys(pair.reader.guid for pair in group))
+    topics = " and ".join(dict.fromkeys((shown(first.writer.topic_name), shown(first.reader.topic_name))))
     counts = f"{count_text(len(writers), 'writer')} and {count_text(len(readers), 'reader')}"
-    yield f"{shown(first.pair.writer.topic_name)}: {counts} do not match"
+    verdict = (
+        "do not match" if first.disagreements else "would match, if their types fit" if first.is_awaited else "match"
+    )
+    yield f"{topics}: {counts} {verdict}"
     for kind, guids in (("writer", writers), ("reader", readers)):
         for guid in guids[:_MOST_NAMED]:
             yield f"  {kind} {guid} of {_owner(census, guid)}"
         if len(guids) > _MOST_NAMED:
             yield f"  and {count_text(len(guids) - _MOST_NAMED, f'more {kind}')}"
-    for disagreement in first.disagreements:
-        offered, requested = shown(disagreement.offered), shown(disagreement.requested)
-        yield f"  {disagreement.policy}: offered {offered}, requested {requested}"
-        yield f"    remedy: {shown(disagreement.remedy)}"
+    for one in first.disagreements:
+        detail = f": {shown(one.detail)}" if one.detail else ""
+        yield f"  {one.policy}: offered {shown(one.offered)}, requested {shown(one.requested)}{detail}"
+        yield f"    remedy: {shown(one.remedy)}"
 
 
 def _owner(census: Census, guid: Guid) -> str:
@@ -203,12 +172,23 @@ def _owner(census: Census, guid: Guid) -> str:
 # --- for programs ----------------------------------------------------------------------------------------------
 
 
-def _diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
+def _explanation_json(census: Census, explanation: Explanation) -> dict[str, object]:
     return {
-        "domain_id": diagnosis.census.domain_id,
-        "topic": diagnosis.asked,
-        "matching": diagnosis.matching,
-        "mismatches": [_mismatch_json(diagnosis.census, mismatch) for mismatch in diagnosis.mismatches],
+        "domain_id": census.domain_id,
+        "topic": explanation.asked[0] if explanation.asked else "",
+        "asked": list(explanation.asked),
+        "complete": explanation.is_complete,
+        "matching": explanation.matching_count,
+        "mismatches": [_pair_json(census, pair) for pair in explanation.mismatches],
+        "pairs": [
+            {
+                "topic": pair.writer.topic_name,
+                "writer": str(pair.writer.guid),
+                "reader": str(pair.reader.guid),
+                "matching": pair.is_matching,
+            }
+            for pair in explanation.pairs
+        ],
         "lonely": [
             {
                 "topic": lonely.topic,
@@ -216,24 +196,46 @@ def _diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
                 "endpoints": [str(guid) for guid in lonely.endpoints],
                 "similar": list(lonely.similar),
             }
-            for lonely in diagnosis.lonely
+            for lonely in explanation.lonely
         ],
+        "troubles": [
+            {
+                "participant": str(trouble.guid.prefix) if trouble.guid is not None else "",
+                "kind": trouble.kind,
+                "offered": trouble.offered,
+                "requested": trouble.requested,
+                "remedy": trouble.remedy,
+            }
+            for trouble in explanation.troubles
+        ],
+        "unknown": [str(guid) for guid in explanation.unknown],
     }
 
 
-def _mismatch_json(census: Census, mismatch: Mismatch) -> dict[str, object]:
-    pair = mismatch.pair
-    assert pair.refusal is not None
+def _pair_json(census: Census, pair: PairExplanation) -> dict[str, object]:
     return {
         "topic": pair.writer.topic_name,
-        "kind": str(pair.refusal.kind),
+        "kind": _kind(pair.disagreements[0]),
         "writer": _endpoint_json(census, pair.writer.guid, pair.writer.type_name),
         "reader": _endpoint_json(census, pair.reader.guid, pair.reader.type_name),
         "disagreements": [
-            {"policy": one.policy, "offered": one.offered, "requested": one.requested, "remedy": one.remedy}
-            for one in mismatch.disagreements
+            {
+                "policy": one.policy,
+                "offered": one.offered,
+                "requested": one.requested,
+                "detail": one.detail,
+                "remedy": one.remedy,
+            }
+            for one in pair.disagreements
         ],
     }
+
+
+def _kind(first: Disagreement) -> str:
+    """What the first cause, which outweighs the others, is about."""
+    if first.policy == "key":
+        return "type"
+    return first.policy if first.policy in ("topic", "type", "partition", "security", "locator") else "qos"
 
 
 def _endpoint_json(census: Census, guid: Guid, type_name: str) -> dict[str, object]:

@@ -17,6 +17,7 @@ import trio
 from ..config import Config
 from ..config.environment import load_config
 from ..config.secure import participant_properties
+from ..discovery.explanation import Explanation
 from ..discovery.matching import MatchRefusal
 from ..engine import (
     DataAvailable,
@@ -38,6 +39,7 @@ from ..structure.status import SecurityRefused, SecurityRevoked
 from ..transport import Pump, PumpOptions
 from .endpoint import Endpoint
 from .entity import Entity, Parent, deadline_scope
+from .explaining import explain_all
 from .lifetime import Lifetime
 from .topic import Topic
 from .type_access import AnnouncedEndpoint, fetch_type_object, fetch_type_objects
@@ -278,6 +280,21 @@ class DomainParticipant(Parent):
     def match_refusals(self) -> dict[tuple[Guid, Guid], MatchRefusal]:
         """For every (own, other) pair of endpoints of one topic that does not match: why not."""
         return dict(self._running_pump().engine.matchmaker.refusals)
+
+    def explain(self, *asked: str | Guid) -> Explanation:
+        """Why writers and readers match or do not: for every pair, all that stands between the two, with remedies.
+
+        ``asked``: a topic's name or a shell pattern of names; or an endpoint's Guid; or two Guids and more, which are
+        compared whatever their topics are.  Nothing: all topics.  It is of our endpoints and of others', and these are
+        judged by what they announce.  Where their types must be asked for first, ``is_complete`` is False: ask once
+        more a moment later.
+
+        Raises BadParameter for a mixture, for two names, and for Guids that are all of writers or all of readers.
+        """
+        pump = self._running_pump()
+        explanation = explain_all(pump.engine, asked, pump.now())
+        pump.settle()  # questions about types
+        return explanation
 
     def drop_counts(self) -> Counter[str]:
         """How many datagrams, submessages and announcements were not acted upon, by reason."""

@@ -65,6 +65,11 @@ class ParticipantProxy:
         return f"<ParticipantProxy {self.prefix}>"
 
     @property
+    def hosts(self) -> list[str]:
+        """The addresses that it spoke from, as text."""
+        return [Locator(LocatorKind.UDPV4, 0, address).host for address in self._hosts]
+
+    @property
     def vendor_id(self) -> VendorId:
         return self.data.vendor_id
 

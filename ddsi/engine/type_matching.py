@@ -15,6 +15,7 @@ names are equal, the samples are XCDR1, and nothing but final or appendable is b
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -25,6 +26,7 @@ from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData,
 from ..structure.errors import MalformedMessage
 from ..structure.guid import Guid
 from ..structure.qos_policies import DataRepresentationId, TypeConsistency
+from ..structure.vendor import OUR_VENDOR_ID
 from ..trace.reasons import TypeStep
 from ..xtypes.assignability import MissingType, TypeMismatch, type_mismatch
 from ..xtypes.type_object import HashedIdentifier, TypeInformation, decode_type_information
@@ -71,7 +73,7 @@ class TypeMatching:
     def judge(
         self, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float, *, may_ask: bool
     ) -> TypeVerdict:
-        """Of two endpoints, one of which is ours.  Types are asked for only where we ``may_ask``."""
+        """Of two endpoints, ours or others'.  Types are asked for only where we ``may_ask``."""
         refusal = names_refusal(writer, reader)
         if refusal is not None and writer.is_keyed != reader.is_keyed:
             return TypeVerdict(refusal)
@@ -81,23 +83,27 @@ class TypeMatching:
             return self._by_name(writer, reader, refusal, _without(writer, reader, of_writer, of_reader))
         if of_writer.minimal == of_reader.minimal or of_writer.complete == of_reader.complete:
             return FITS
-        is_writer_ours = writer.guid.prefix == self._engine.guid.prefix
-        remote, information = (reader, of_reader) if is_writer_ours else (writer, of_writer)
-        if self._is_unreadable(of_writer if is_writer_ours else of_reader, remote):
-            why = f"{remote.guid} cannot read what the type of this one is made of"
-            return replace(self._by_name(writer, reader, refusal, why), withdraws=True)
-        answer = self._compare(pair, remote.guid.prefix, reader.qos.type_consistency)
+        sides = ((writer, of_writer, pair[0]), (reader, of_reader, pair[1]))
+        others = [side for side in sides if side[0].guid.prefix != self._engine.guid.prefix]
+        if len(others) == 1:
+            ((remote, _, _),) = others
+            if self._is_unreadable(of_reader if remote is writer else of_writer, remote):
+                why = f"{remote.guid} cannot read what the type of this one is made of"
+                return replace(self._by_name(writer, reader, refusal, why), withdraws=True)
+        owners = tuple(side[0].guid.prefix for side in others)
+        answer = self._compare(pair, owners, reader.qos.type_consistency)
         if isinstance(answer, MissingType):
-            root = pair[0] if remote is writer else pair[1]
-            unavailable = self._engine.types.fetch_all(remote.guid, root, information, now) if may_ask else None
-            if not isinstance(unavailable, str):
-                detail = f"{remote.guid} has another {remote.type_name}: what is it made of?"
+            unavailable = self._ask(others, now) if may_ask else None
+            if unavailable is None and others:
+                asked = others[0][0]
+                detail = f"{asked.guid} has another {asked.type_name}: what is it made of?"
                 return TypeVerdict(step=TypeStep.AWAITED, detail=detail)
-            return self._by_name(writer, reader, refusal, unavailable)
+            return self._by_name(writer, reader, refusal, unavailable or "a type of ours is not known")
         if answer is None:
             return TypeVerdict(step=TypeStep.ASSIGNABLE, detail=_texts(writer, reader))
-        if refusal is None and _is_xcdr1(writer):
-            lenient = self._compare(pair, remote.guid.prefix, reader.qos.type_consistency, ignores_extensibility=True)
+        is_lenient = len(others) < 2 or OUR_VENDOR_ID in (writer.vendor_id, reader.vendor_id)
+        if is_lenient and refusal is None and _is_xcdr1(writer):
+            lenient = self._compare(pair, owners, reader.qos.type_consistency, ignores_extensibility=True)
             if lenient is None:
                 return TypeVerdict(step=TypeStep.EXTENSIBILITY, detail=str(answer), withdraws=True)
         return TypeVerdict(_refusal(writer, reader, answer))
@@ -117,20 +123,30 @@ class TypeMatching:
             )
         return TypeVerdict(refusal, None if refusal is not None or not why else TypeStep.BY_NAME, why)
 
+    def _ask(
+        self, others: Sequence[tuple[DiscoveredEndpointData, TypeInformation, HashedIdentifier]], now: float
+    ) -> str | None:
+        """Have the participants asked whose types are not known; why one of them is of no use, if so."""
+        for endpoint, information, root in others:
+            answer = self._engine.types.fetch_all(endpoint.guid, root, information, now)
+            if isinstance(answer, str):
+                return answer
+        return None
+
     def _compare(
         self,
         pair: tuple[HashedIdentifier, HashedIdentifier],
-        prefix: bytes,
+        owners: tuple[bytes, ...],
         consistency: TypeConsistency,
         *,
         ignores_extensibility: bool = False,
     ) -> MissingType | TypeMismatch | None:
         """What assignability says; remembered, as a peer may announce the same again and again."""
         of_writer, of_reader = pair
-        question = (of_writer, of_reader, prefix, consistency, ignores_extensibility)
+        question = (of_writer, of_reader, owners, consistency, ignores_extensibility)
         if question in self._answers:
             return self._answers[question]
-        objects = self._engine.types.registry.known_to(prefix)
+        objects = self._engine.types.registry.known_to(*owners)
         answer = type_mismatch(of_reader, of_writer, objects, consistency, ignores_extensibility=ignores_extensibility)
         if not isinstance(answer, MissingType):
             if len(self._answers) >= _MOST_REMEMBERED:

@@ -120,9 +120,9 @@ class TypeRegistry:
 
     # --- all ---------------------------------------------------------------------------------------------
 
-    def known_to(self, prefix: bytes) -> Mapping[HashedIdentifier, TypeObject]:
-        """Every TypeObject by which types of this participant are judged: ours, those that everybody knows, its own."""
-        return ChainMap(self._own, self._objects, self._components.get(prefix, {}))
+    def known_to(self, *prefixes: bytes) -> Mapping[HashedIdentifier, TypeObject]:
+        """Every TypeObject by which types of these participants are judged: ours, those everybody knows, theirs."""
+        return ChainMap(self._own, self._objects, *(self._components.get(prefix, {}) for prefix in prefixes))
 
     def collect(self, root: HashedIdentifier, prefix: bytes) -> tuple[BuiltTypes, list[HashedIdentifier]]:
         """The type and all that it needs, as far as they are known, and the identifiers of those that are not.

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
 
 from .. import dcps
 from ..config import Config
+from ..discovery.explanation import Explanation
 from ..discovery.matching import MatchRefusal
 from ..structure.builtin_topic_data import ParticipantBuiltinTopicData
 from ..structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
@@ -167,6 +168,10 @@ class ParticipantPortal(EntityPortal):
     def match_refusals(self) -> dict[tuple[Guid, Guid], MatchRefusal]:
         """For every (own, other) pair of endpoints of one topic that does not match: why not."""
         return self._ask(self._inner.match_refusals)
+
+    def explain(self, *asked: str | Guid) -> Explanation:
+        """Why writers and readers match or do not.  See ``ddsi.DomainParticipant.explain``."""
+        return self._ask(partial(self._inner.explain, *asked))
 
     def drop_counts(self) -> Counter[str]:
         """How many datagrams, submessages and announcements were not acted upon, by reason."""

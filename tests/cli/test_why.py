@@ -2,26 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import dataclasses
 
 import pytest
 
 from ddsi.cli import why
-from ddsi.cli.remedies import Disagreement, disagreements
-from ddsi.cli.why import diagnose
-from ddsi.discovery.matching import judge
+from ddsi.discovery import explanation
+from ddsi.discovery.explanation import Explanation, PairExplanation, explained_pairs, lonely_topics
+from ddsi.discovery.matching import names_refusal
+from ddsi.discovery.remedies import Disagreement, disagreements
+from ddsi.serialization.parameter_id import ParameterId
 from ddsi.structure import qos_policies as p
 from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
+from ddsi.structure.guid import Guid
 from ddsi.structure.qos import EndpointQos
-from ddsi.xtypes.assignability import TypeMismatch
 
 from .seen import census, reader, writer
 
+Endpoint = DiscoveredWriterData | DiscoveredReaderData
+
 
 def _disagreements(one: DiscoveredWriterData, other: DiscoveredReaderData) -> tuple[Disagreement, ...]:
-    refusal = judge(one, other)
-    assert refusal is not None
-    return disagreements(one, other, refusal)
+    """With types compared by name."""
+    return disagreements(one, other, names_refusal(one, other))
+
+
+def _explained(*endpoints: Endpoint, topic: str = "") -> Explanation:
+    writers = [data for data in endpoints if isinstance(data, DiscoveredWriterData)]
+    readers = [data for data in endpoints if isinstance(data, DiscoveredReaderData)]
+
+    def judge(one: DiscoveredWriterData, other: DiscoveredReaderData) -> PairExplanation:
+        return PairExplanation(one, other, _disagreements(one, other))
+
+    return Explanation(
+        (topic,) if topic else (),
+        explained_pairs(writers, readers, judge, topic),
+        lonely_topics(writers, readers, topic),
+    )
+
+
+def _text(*endpoints: Endpoint, topic: str = "") -> list[str]:
+    return list(why._lines(census(*endpoints), _explained(*endpoints, topic=topic)))
 
 
 @pytest.mark.parametrize(
@@ -84,33 +105,63 @@ def test_what_would_keep_them_apart_within_one_partition_is_told_at_once() -> No
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "remedy"),
+    ("one", "other", "policy", "remedy"),
     [
-        (writer(), reader(keyed=False), "the writer's type has key members, the reader's has none"),
-        (writer(keyed=False), reader(), "the reader's type has key members, the writer's has none"),
-        (writer(type_name="m::msg::dds_::String_"), reader(type_name="m/msg/String"), "one full name on both sides"),
-        (writer(type_name="Shape"), reader(type_name="Image"), "different types"),
+        (writer(), reader(keyed=False), "key", "the writer's type has key members, the reader's has none"),
+        (writer(keyed=False), reader(), "key", "the reader's type has key members, the writer's has none"),
+        (
+            writer(type_name="m::msg::dds_::String_"),
+            reader(type_name="m/msg/String"),
+            "type",
+            "full name on both sides",
+        ),
+        (writer(type_name="Shape"), reader(type_name="Image"), "type", "different types"),
     ],
 )
-def test_types(one: DiscoveredWriterData, other: DiscoveredReaderData, remedy: str) -> None:
+def test_types(one: DiscoveredWriterData, other: DiscoveredReaderData, policy: str, remedy: str) -> None:
     (found,) = _disagreements(one, other)
-    assert found.policy == "type"
+    assert found.policy == policy
     assert remedy in found.remedy
 
 
-def test_a_diagnosis_counts_what_fits_too() -> None:
-    seen = census(writer(), reader(), reader(number=2, qos=EndpointQos()), reader(number=3, keyed=False))
-    diagnosis = diagnose(seen)
-    assert diagnosis.matching == 2
-    assert len(diagnosis.mismatches) == 1
-    assert diagnosis.lonely == ()
+def test_everything_is_told_at_once() -> None:
+    """Topic, key, type, partition and policy of one pair: nobody has to come back for the next cause."""
+    there = EndpointQos(partition=p.Partition("a"))
+    wants = EndpointQos(reliability=p.Reliable())
+    found = _disagreements(
+        writer("Square", qos=there, type_name="A"), reader("square", qos=wants, type_name="B", keyed=False)
+    )
+    assert [one.policy for one in found] == ["topic", "key", "type", "partition", "reliability"]
+
+
+def _protected(attributes: int, plugin: int = 0) -> tuple[tuple[int, bytes], ...]:
+    valid = 1 << 31
+    value = b"".join((mask | valid).to_bytes(4, "little") for mask in (attributes, plugin))
+    return ((ParameterId.ENDPOINT_SECURITY_INFO, value),)
+
+
+def test_governance_that_differs_is_told_by_what_is_protected() -> None:
+    one = dataclasses.replace(writer(), security_parameters=_protected(0b1000))
+    other = dataclasses.replace(reader(), security_parameters=_protected(0b11000, 1))
+    (found,) = _disagreements(one, other)
+    assert (found.policy, found.offered) == ("security", "submessage protected")
+    assert found.requested == "submessage and payload protected, plugin attributes 0x1"
+    assert "one governance document" in found.remedy
+    assert _disagreements(one, dataclasses.replace(other, security_parameters=one.security_parameters)) == ()
+
+
+def test_what_fits_is_counted_too() -> None:
+    found = _explained(writer(), reader(), reader(number=2, qos=EndpointQos()), reader(number=3, keyed=False))
+    assert found.matching_count == 2
+    assert len(found.mismatches) == 1
+    assert found.lonely == ()
 
 
 def test_one_topic_of_many() -> None:
-    seen = census(writer("A"), reader("A", keyed=False), writer("B", number=2), reader("B", number=2, keyed=False))
-    assert [found.pair.writer.topic_name for found in diagnose(seen, "B").mismatches] == ["B"]
-    assert diagnose(seen, "C").is_empty
-    assert not diagnose(seen).is_empty
+    seen = writer("A"), reader("A", keyed=False), writer("B", number=2), reader("B", number=2, keyed=False)
+    assert [found.writer.topic_name for found in _explained(*seen, topic="B").mismatches] == ["B"]
+    assert _text(*seen, topic="C")[0].startswith("Nobody was seen with a writer or reader of C")
+    assert not _text(*seen)[0].startswith("Nobody")
 
 
 @pytest.mark.parametrize(
@@ -123,37 +174,62 @@ def test_one_topic_of_many() -> None:
     ],
 )
 def test_a_lonely_topic_and_what_may_have_been_meant(topic: str, others: list[str], similar: tuple[str, ...]) -> None:
-    seen = census(writer(topic), *(reader(name, number=number) for number, name in enumerate(others, 1)))
-    lonely = {found.topic: found for found in diagnose(seen).lonely}
+    seen: list[Endpoint] = [writer(topic), *(reader(name, number=number) for number, name in enumerate(others, 1))]
+    lonely = {found.topic: found for found in _explained(*seen).lonely}
     assert lonely[topic].kind == "writer"
     assert lonely[topic].similar == similar
 
 
+@pytest.mark.parametrize(
+    ("offered", "requested", "how"),
+    [
+        ("Square", "square", "upper and lower case"),
+        ("Square", "Square ", "blanks"),
+        ("chatter", "rt/chatter", "ROS 2"),
+        ("/chatter", "rt/chatter", "ROS 2"),
+    ],
+)
+def test_topics_that_were_meant_to_be_one_are_compared(offered: str, requested: str, how: str) -> None:
+    (pair,) = _explained(writer(offered), reader(requested, qos=EndpointQos(durability=p.TransientLocal()))).pairs
+    topic, durability = pair.disagreements
+    assert (topic.policy, topic.offered, topic.requested) == ("topic", repr(offered), repr(requested))
+    assert how in topic.remedy
+    assert durability.policy == "durability"
+
+
+def test_topics_that_have_their_own_other_half_are_left_alone() -> None:
+    """Two pairs whose topics differ by case alone are nobody's mistake."""
+    seen = writer("A"), reader("A"), writer("a", number=2), reader("a", number=2)
+    assert [pair.is_matching for pair in _explained(*seen).pairs] == [True, True]
+
+
+def test_pairs_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(explanation, "MOST_EXPLAINED", 10)
+    many: list[Endpoint] = [*(writer(number=n) for n in range(1, 100)), *(reader(number=n) for n in range(1, 100))]
+    assert len(_explained(*many).pairs) == 10
+
+
 def test_pairs_with_the_same_reasons_are_told_of_together() -> None:
     """Fifty readers with one problem make one paragraph, and only some are named."""
-    readers = [reader(number=number, keyed=False) for number in range(1, 51)]
-    lines = list(why._lines(diagnose(census(writer(), *readers))))
+    lines = _text(writer(), *(reader(number=number, keyed=False) for number in range(1, 51)))
     assert lines[0] == "Square: 1 writer and 50 readers do not match"
     assert sum(line.startswith("  reader ") for line in lines) == 4
     assert "  and 46 more readers" in lines
     assert lines[-1] == "0 pairs of a writer and a reader fit, 50 do not."
 
 
+def test_pairs_that_match_are_listed_where_somebody_asks_about_the_topic() -> None:
+    assert _text(writer(), reader()) == ["1 pair of a writer and a reader fit, none do not."]
+    assert _text(writer(), reader(), topic="Square")[0] == "Square: 1 writer and 1 reader match"
+
+
+def test_a_guid_that_nobody_announces_is_not_discovered() -> None:
+    guid = Guid(bytes(15) + b"\x02")
+    lines = list(why._lines(census(), Explanation((str(guid),), (), unknown=(guid,))))
+    assert lines[0].startswith(f"{guid}: not discovered")
+    assert "ddsi doctor" in lines[1]
+
+
 def test_text_from_the_network_is_made_safe() -> None:
-    seen = census(writer("\x1b[2J"), reader("\x1b[2J", keyed=False), writer("\x1b]0;x", number=2))
-    assert not any("\x1b" in line for line in why._lines(diagnose(seen)))
-
-
-def test_types_that_were_fetched_are_judged_by_what_they_are_made_of() -> None:
-    one, other = writer("x", type_name="T"), reader("x", type_name="U")
-    one, other = replace(one, type_information=b"1"), replace(other, type_information=b"2")
-    question = (b"1", b"2", other.qos.type_consistency)
-    seen = census(one, other)
-    assert [mismatch.disagreements[0].policy for mismatch in diagnose(seen).mismatches] == ["type"]
-    assert diagnose(seen, judgements={question: None}).matching == 1
-    (mismatch,) = diagnose(seen, judgements={question: TypeMismatch("pose.x", "int32 there")}).mismatches
-    (told,) = mismatch.disagreements
-    assert told.requested == "U; pose.x: int32 there"
-    final = TypeMismatch("", "final for the reader, appendable for the writer")
-    (mismatch,) = diagnose(seen, judgements={question: final}).mismatches
-    assert "say @final, @appendable or @mutable" in mismatch.disagreements[0].remedy
+    seen = writer("\x1b[2J"), reader("\x1b[2J", keyed=False), writer("\x1b]0;x", number=2)
+    assert not any("\x1b" in line for line in _text(*seen))

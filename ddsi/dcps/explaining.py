@@ -1,0 +1,29 @@
+"""Asking a participant why endpoints match or do not: reads what was asked; the answer is ``engine.explaining``'s."""
+
+from __future__ import annotations
+
+from ..discovery.explanation import Explanation
+from ..engine import Participant
+from ..engine.explaining import explain, explain_endpoints
+from ..structure.errors import BadParameter
+from ..structure.guid import Guid
+
+__all__ = ["explain_all"]
+
+
+def explain_all(engine: Participant, asked: tuple[str | Guid, ...], now: float) -> Explanation:
+    """See ``DomainParticipant.explain``."""
+    guids = tuple(one for one in asked if isinstance(one, Guid))
+    names = [one for one in asked if isinstance(one, str)]
+    if len(guids) + len(names) < len(asked) or (guids and names) or len(names) > 1:
+        raise BadParameter(f"explain() takes one topic's name or pattern, or Guids of endpoints, not {asked!r}")
+    if not guids:
+        return explain(engine, names[0] if names else "", now)
+    if len(guids) > 1:
+        for kind, is_all in (
+            ("writers", all(guid.entity_id.is_writer for guid in guids)),
+            ("readers", all(guid.entity_id.is_reader for guid in guids)),
+        ):
+            if is_all:
+                raise BadParameter(f"{', '.join(map(str, guids))} are all {kind}: a writer and a reader are wanted")
+    return explain_endpoints(engine, guids, now)
