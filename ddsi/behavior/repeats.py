@@ -26,10 +26,14 @@ _MAX_WRITERS = 1024
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """How far a reader had come: the number whose turn it was, and the source timestamp of the last one delivered."""
+    """How far a reader had come: the number whose turn it was, and the source timestamp of the last one delivered.
+
+    ``is_forgotten``: the writer knows the reader no more either, so it tells all that it keeps.
+    """
 
     next_sn: int
     timestamp: int
+    is_forgotten: bool = False
 
 
 class _Sink(Protocol):

@@ -126,16 +126,19 @@ class StatefulReader:
         )
         if proxy.is_reliable and not is_local:
             proxy.schedule.matched(now)
-        if self._repeats is not None and (position := self._repeats.position_of(data.guid)) is not None:
+        position = self._repeats.position_of(data.guid) if self._repeats is not None else None
+        if position is not None and not position.is_forgotten:
             proxy.resume_sn = position.next_sn
         self.writers[data.guid] = proxy
         return proxy
 
-    def matched_writer_remove(self, guid: Guid, now: float, *, may_return: bool = False) -> WriterProxy | None:
+    def matched_writer_remove(
+        self, guid: Guid, now: float, *, may_return: bool = False, is_forgotten: bool = False
+    ) -> WriterProxy | None:
         """RTPS 2.5 §8.4.10.3.3.
 
         What was waiting for a number that will not come any more is delivered before it goes.  But what keeps history
-        and ``may_return`` will send it again, in order.
+        and ``may_return`` will send it again, in order; all of it, where it has forgotten this reader.
         """
         proxy = self.writers.pop(guid, None)
         if proxy is None:
@@ -145,7 +148,7 @@ class StatefulReader:
             proxy.reorder.skip_to(proxy.last_seq + 1)
             self._deliver(proxy, now)
         if may_return and proxy.latest_timestamp >= 0:
-            self._remember(proxy)
+            self._remember(proxy, is_forgotten=is_forgotten)
         if self._originals is not None:
             self._originals.writer_ended(guid, proxy.next_sn - 1)
         return proxy
@@ -154,12 +157,12 @@ class StatefulReader:
         """Is it handed on by a service, and known from its own writer or from another service?"""
         return self._originals is not None and self._originals.is_repeated(change, self.writers)
 
-    def _remember(self, proxy: WriterProxy) -> None:
+    def _remember(self, proxy: WriterProxy, *, is_forgotten: bool) -> None:
         """From now on, what comes passes the filter first: a reader that loses nobody is spared that."""
         if self._repeats is None:
             assert self.on_repeat is not None
             self.history = self._repeats = RepeatFilter(self.history, self.on_repeat)
-        self._repeats.remember(proxy.guid, Position(proxy.next_sn, proxy.latest_timestamp))
+        self._repeats.remember(proxy.guid, Position(proxy.next_sn, proxy.latest_timestamp, is_forgotten))
 
     # --- what writers send -------------------------------------------------------------------------------
 

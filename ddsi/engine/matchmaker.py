@@ -13,7 +13,7 @@ from ..behavior.stateful_reader import RemoteWriter
 from ..behavior.stateless_reader import StatelessReader
 from ..discovery.matching import MatchRefusal, RefusalKind, policies_refusal
 from ..discovery.participant_proxy import ParticipantProxy
-from ..spi import PENDING, Admission, Refused
+from ..spi import PENDING, Admission, Protection, Refused
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
 from ..structure.guid import Guid
 from ..structure.locator import Locator
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from .participant import Participant
 
 __all__ = ["Matchmaker"]
-
-_MAY_RETURN = (LossReason.LEASE_EXPIRED, LossReason.RESTARTED)
-"""Its writers may be the same as before, and repeat what they keep: who authenticated anew need not have died."""
 
 
 class Matchmaker:
@@ -310,7 +307,11 @@ class Matchmaker:
     def unmatch_writer(self, reader: LocalReader, guid: Guid, reason: LossReason, now: float) -> None:
         engine = self._engine
         proxy = reader.behavior.writers.get(guid)
-        self.detach_writer(reader, guid, now, may_return=reason in _MAY_RETURN)
+        # Who authenticated anew may be the same as before, and then repeats what it keeps.  Without protection a new
+        # program's samples may have come in the old one's place already, and nothing tells what is a repetition.
+        is_forgotten = reason is LossReason.RESTARTED
+        may_return = reason is LossReason.LEASE_EXPIRED or (is_forgotten and self._is_protected(guid))
+        self.detach_writer(reader, guid, now, may_return=may_return, is_forgotten=is_forgotten)
         engine.hooks.unmatch(reader.guid, guid)
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
@@ -322,10 +323,16 @@ class Matchmaker:
             reader.guid, reader.liveliness_changed(guid, alive=-1 if alive else 0, not_alive=0 if alive else -1)
         )
 
-    def detach_writer(self, reader: LocalReader, guid: Guid, now: float, *, may_return: bool = False) -> None:
+    def _is_protected(self, writer: Guid) -> bool:
+        hooks = self._engine.hooks
+        return hooks.protects_payload(writer) or not hooks.admits(writer, Protection.NONE)
+
+    def detach_writer(
+        self, reader: LocalReader, guid: Guid, now: float, *, may_return: bool = False, is_forgotten: bool = False
+    ) -> None:
         """Undo :meth:`attach_writer`; fragments that were meant for this reader alone go with it."""
         engine = self._engine
-        proxy = reader.behavior.matched_writer_remove(guid, now, may_return=may_return)
+        proxy = reader.behavior.matched_writer_remove(guid, now, may_return=may_return, is_forgotten=is_forgotten)
         engine.forget_proxy(reader.guid, guid)
         remote = engine.remote_writers.get(guid)
         if remote is None or proxy is None:

@@ -41,4 +41,6 @@ def test_it_begins_anew(governance: str, loss: float, tmp_path: Path) -> None:
     writer, answers = a.writer("Square", LATE), a.reader("Answers", LATE)
     writer.write()
     writer.write()
-    assert domain.run_until(lambda: samples(reader) == [1, 1, 2] and samples(answers) == [1], 60)
+    # Where nothing protects the data, a sample of the new program may come before anybody knows that it is another one.
+    expected = [[1, 1, 2], [1, 2, 1, 2]] if governance == "nothing" else [[1, 1, 2]]
+    assert domain.run_until(lambda: samples(reader) in expected and samples(answers) == [1], 60)
