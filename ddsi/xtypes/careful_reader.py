@@ -239,7 +239,7 @@ class _CarefulReader:
         for index in range(count):
             with self._at(f"[{index}]"):
                 key = self._value(type_.key)
-                if key in entries:
+                if key in entries and not self._is_unfit:
                     self.fail(f"the key {key!r} is there twice")
                 entries[key] = self._value(type_.value)
         return entries

@@ -204,6 +204,19 @@ def test_what_fits_is_kept(representation: DataRepresentationId) -> None:
     )
 
 
+def test_a_map_with_keys_that_are_no_literals_becomes_the_default() -> None:
+    @idl.struct(extensibility=idl.FINAL)
+    class Sent:
+        by_color: idl.map[idl.int32, idl.int8]
+
+    @idl.struct(extensibility=idl.FINAL)
+    class Received:
+        by_color: Annotated[idl.map[Color, idl.int8], idl.try_construct("use_default")]
+
+    octets = serialize(Sent({7: 1, 8: 2, 1: 3}), representation=XCDR1)
+    assert deserialize(Received, octets).by_color == {}
+
+
 def test_octets_out_of_order_are_malformed_all_the_same() -> None:
     """USE_DEFAULT forgives values, not octets: a string that is no UTF-8, or ends behind the sample."""
 
