@@ -91,7 +91,7 @@ class _Unit:
         self.since = now
         self.is_set = is_set
         self.changes: list[tuple[_Member, CacheChange]] = []
-        self.octets = 0
+        self.octets = OCTETS_BESIDE_PAYLOAD  # an empty one has a place in the queue too
         self.begun: dict[_PairKey, None] = {}
         self.ended: dict[_PairKey, None] = {}
         self.end_sn = group_sn
@@ -250,8 +250,8 @@ class SubscriberGroup:
             return False
         group_sn = last.coherence.group_sn if last.coherence is not None else 0
         unit = _Unit(group_sn or publisher.highest(), now, is_set=False)
-        self.octets += unit.put(member, changes)
-        publisher.push(unit)
+        unit.put(member, changes)
+        self._push(publisher, unit)
         self._note(publisher, member, last, since=changes[0], before_sn=unit.group_sn)
         self._release_of(publisher, now)
         return True
@@ -294,12 +294,14 @@ class SubscriberGroup:
         coherence = end.coherence
         assert coherence is not None
         publisher = self._find(member, end.writer_guid)
+        if self._has_to_wait(member, publisher):
+            return False
         if member.policy.coherent_access:
             unit = self._unit_of(publisher, coherence.group_set_sn, now)
             self._note(publisher, member, end, since=end, before_sn=coherence.group_set_sn + 1)
             self._ended(publisher, unit, member, end, end)
         else:  # all that it means here is its place in the order
-            publisher.push(_Unit(coherence.group_sn or publisher.highest(), now, is_set=False))
+            self._push(publisher, _Unit(coherence.group_sn or publisher.highest(), now, is_set=False))
             self._note(publisher, member, end, since=end, before_sn=coherence.group_sn)
         self._release_of(publisher, now)
         return True
@@ -319,8 +321,12 @@ class SubscriberGroup:
         unit = publisher.sets.get(group_set_sn)
         if unit is None and group_set_sn and group_set_sn not in publisher.past_sets:
             unit = _Unit(group_set_sn, now, is_set=True)
-            publisher.push(unit)
+            self._push(publisher, unit)
         return unit
+
+    def _push(self, publisher: _Publisher, unit: _Unit) -> None:
+        publisher.push(unit)
+        self.octets += unit.octets
 
     def _ended(
         self, publisher: _Publisher, unit: _Unit | None, member: _Member, last: CacheChange, end: CacheChange
@@ -431,8 +437,8 @@ class SubscriberGroup:
         unit.is_gone = True
         publisher.forget_set(unit)
         self._lose(unit, why)
-        self.octets -= unit.octets
-        unit.octets = 0
+        self.octets += OCTETS_BESIDE_PAYLOAD - unit.octets
+        unit.octets = OCTETS_BESIDE_PAYLOAD  # it stays in the queue until its turn comes
         unit.changes.clear()
 
     def _lose(self, unit: _Unit, why: str, *, besides: _Member | None = None) -> None:

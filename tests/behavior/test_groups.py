@@ -270,12 +270,26 @@ def test_what_strangers_never_end_is_bounded() -> None:
     bench.put(0, 1, 1)
     for number in range(3, 2000):
         assert bench.put(1, number)
-        assert bench.group.octets <= 101 * (OCTETS_BESIDE_PAYLOAD + 4)
+        assert bench.group.octets <= 103 * (OCTETS_BESIDE_PAYLOAD + 4)
     assert len(bench.seen()) > 1000, "the set was given up"
     for number in range(1, 3000):
         bench.put(2, 2 * number + 4000, 2 * number + 4000, end=True)
     publisher = next(iter(bench.group._publishers.values()))
     assert len(publisher.past_sets) <= 1024
+    assert len(publisher.queue) <= 100, "marks of sets that nobody else has part in"
+    assert len(publisher.sets) <= 100
+
+
+def test_sets_that_were_given_up_behind_one_that_goes_on_are_bounded_too() -> None:
+    bench = Bench(max_octets=100 * OCTETS_BESIDE_PAYLOAD)
+    bench.put(0, 1, 1)
+    for number in range(1, 1000):
+        bench.put(1, 10 * number, 10 * number)
+        bench.numbers[1] += 1  # the next one is missing
+        bench.put(1, 10 * number + 2, 10 * number, end=True)
+    publisher = next(iter(bench.group._publishers.values()))
+    assert len(publisher.queue) <= 102
+    assert bench.seen() == []
 
 
 def test_order_waits_for_what_is_missing_and_not_for_what_nobody_here_reads() -> None:
