@@ -144,7 +144,8 @@ class StatefulReader:
         if proxy is None:
             return None
         may_return = may_return and self.on_repeat is not None
-        if proxy.is_reliable and not (may_return and proxy.needs_historical_data):
+        if proxy.is_reliable and proxy.reorder and not (may_return and proxy.needs_historical_data):
+            # Only where something waits behind what is missing: else a writer that never lost us may still bring that.
             proxy.reorder.skip_to(proxy.last_seq + 1)
             self._deliver(proxy, now)
         if may_return and proxy.latest_timestamp >= 0:
