@@ -14,13 +14,14 @@ from ddsi.messages.heartbeat import Heartbeat
 from ddsi.messages.raw_submessage import SubmessageKind, iterate_submessages
 from ddsi.serialization.parameter_id import ParameterId as P
 from ddsi.serialization.parameter_list import ParameterList
-from ddsi.simulation import Domain, NodeReader, NodeWriter
+from ddsi.simulation import Domain, LinkConditions, NodeReader, NodeWriter
 from ddsi.simulation.endpoints import payload_of
 from ddsi.structure.guid import EntityId, EntityKind
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import AccessScope, BestEffort, KeepAll, Presentation, Reliable
 from ddsi.structure.sequence_number import NumberSet
 from ddsi.structure.vendor import PROTOCOL_VERSION
+from tests.engine.xor_security import XorSecurity
 
 TOPIC, GROUP = AccessScope.TOPIC, AccessScope.GROUP
 UNKNOWN = "ffffffff00000000"
@@ -235,3 +236,28 @@ def test_who_does_not_ask_sees_samples_at_once_and_no_ends() -> None:
     assert spoken.seen() == [1]
     spoken.data(3)
     assert spoken.seen() == [1, 3]
+
+
+# --- protected -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("topic", ["SecretOfTheDay", "Open"])
+@pytest.mark.parametrize("seed", range(4))
+def test_sets_are_seen_whole_among_secured_participants(topic: str, seed: int) -> None:
+    """What ends a set has no payload to protect, and is protected all the same."""
+    domain = Domain(seed, conditions=LinkConditions(loss=0.2, reordering=0.2))
+    here, there = (domain.node(make_hooks=XorSecurity) for _ in range(2))
+    qos = Qos(reliability=Reliable(), history=KeepAll(), presentation=Presentation(GROUP, True, True))
+    publisher, subscriber = here.publisher(), there.subscriber()
+    writers = [here.writer(topic + name, qos, publisher=publisher) for name in "ab"]
+    readers = [there.reader(topic + name, qos, takes=False, subscriber=subscriber) for name in "ab"]
+    assert domain.run_until(domain.all_matched, 60)
+    with publisher.coherent_changes():
+        for writer in writers:
+            writer.write()
+        domain.run(2)
+        assert [len(reader.history) for reader in readers] == [0, 0]
+        for writer in writers:
+            writer.write(5000)
+    assert domain.run_until(lambda: all(reader.history.has_news for reader in readers), 30)
+    assert [len(reader.history) for reader in readers] == [2, 2]
