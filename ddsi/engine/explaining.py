@@ -29,6 +29,7 @@ from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData,
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..trace.reasons import DropReason
+from .type_matching import TypeVerdict
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -87,7 +88,7 @@ def judged_pair(
     engine: Participant, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float
 ) -> PairExplanation:
     """Everything that stands between the two."""
-    types = engine.type_matching.judge(writer, reader, now, may_ask=True)
+    types = _judged_types(engine, writer, reader, now)
     found = (
         *disagreements(writer, reader, types.refusal),
         *_security(engine, writer, reader),
@@ -95,6 +96,18 @@ def judged_pair(
         *_unreachable(engine, reader, "reader"),
     )
     return PairExplanation(writer, reader, found, is_awaited=types.is_awaited)
+
+
+def _judged_types(
+    engine: Participant, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float
+) -> TypeVerdict:
+    """As the matchmaker has it; where a member is at fault, by types that have its name, if they are to be had."""
+    types = engine.type_matching.judge(writer, reader, now, may_ask=True)
+    if types.refusal is None or not types.refusal.detail:
+        return types
+    named = engine.type_matching.judge(writer, reader, now, may_ask=True, names_members=True)
+    has_name = named.refusal is not None and bool(named.refusal.detail)
+    return named if named.is_awaited or has_name else types
 
 
 class _Judge:

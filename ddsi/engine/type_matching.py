@@ -71,14 +71,23 @@ class TypeMatching:
         self._answers: dict[tuple[object, ...], _Answer] = {}
 
     def judge(
-        self, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float, *, may_ask: bool
+        self,
+        writer: DiscoveredWriterData,
+        reader: DiscoveredReaderData,
+        now: float,
+        *,
+        may_ask: bool,
+        names_members: bool = False,
     ) -> TypeVerdict:
-        """Of two endpoints, ours or others'.  Types are asked for only where we ``may_ask``."""
+        """Of two endpoints, ours or others'.  Types are asked for only where we ``may_ask``.
+
+        ``names_members``: compare complete types if both announce them.  Minimal ones have hashes in place of names.
+        """
         refusal = names_refusal(writer, reader)
         if refusal is not None and writer.is_keyed != reader.is_keyed:
             return TypeVerdict(refusal)
         of_writer, of_reader = _information(writer.type_information), _information(reader.type_information)
-        pair = _comparable(of_writer, of_reader)
+        pair = _comparable(of_writer, of_reader, names_members=names_members)
         if of_writer is None or of_reader is None or pair is None:
             return self._by_name(writer, reader, refusal, _without(writer, reader, of_writer, of_reader))
         if of_writer.minimal == of_reader.minimal or of_writer.complete == of_reader.complete:
@@ -187,12 +196,13 @@ def _information(octets: bytes) -> TypeInformation | None:
 
 
 def _comparable(
-    of_writer: TypeInformation | None, of_reader: TypeInformation | None
+    of_writer: TypeInformation | None, of_reader: TypeInformation | None, *, names_members: bool
 ) -> tuple[HashedIdentifier, HashedIdentifier] | None:
     """The identifiers of the kind that both announce, the writer's first.  All vendors know minimal TypeObjects."""
     if of_writer is None or of_reader is None:
         return None
-    for one, two in (of_writer.minimal, of_reader.minimal), (of_writer.complete, of_reader.complete):
+    kinds = [(of_writer.minimal, of_reader.minimal), (of_writer.complete, of_reader.complete)]
+    for one, two in reversed(kinds) if names_members else kinds:
         if isinstance(one, HashedIdentifier) and isinstance(two, HashedIdentifier):
             return one, two
     return None
