@@ -45,6 +45,8 @@ PATIENCE_S = 0.5
 
 _MAX_PAST_SETS = 1024  # of each publisher: late parts of these are known to be too late
 
+_MAX_IDLE_PUBLISHERS = 64  # lost ones, of which parts of sets that are over may come once more
+
 _PairKey = tuple[Guid, Guid]  # reader, writer
 
 
@@ -210,16 +212,25 @@ class SubscriberGroup:
         publisher.pairs[(reader, proxy.guid)] = _Pair(proxy)
         self._of_pair[(reader, proxy.guid)] = publisher
 
-    def writer_unmatched(self, reader: Guid, writer: Guid, now: float) -> None:
-        """It is waited for no more.  A set whose part it has not ended will never be whole."""
+    def writer_unmatched(
+        self, reader: Guid, writer: Guid, now: float, *, has_said_all: bool, may_return: bool = False
+    ) -> None:
+        """It is waited for no more.  A set whose part it has not ended will never be whole.
+
+        Nor will one that it may have had a part in, unless it ``has_said_all``, being closed in good order.  If it
+        ``may_return``, parts of those sets may come once more, and are too late.
+        """
         key = (reader, writer)
         publisher = self._of_pair.pop(key, None)
         if publisher is None:
             return
-        del publisher.pairs[key]
+        pair = publisher.pairs.pop(key)
         for unit in list(publisher.sets.values()):
-            if key in unit.begun and key not in unit.ended:
+            may_lack = key in unit.begun or not (has_said_all or self._has_passed(pair, unit, now))
+            if key not in unit.ended and may_lack:
                 self._give_up(publisher, unit, "a writer was gone before the end of its coherent set")
+        if not may_return and not publisher.pairs:
+            publisher.past_sets.clear()
         self._release_of(publisher, now)
 
     def told(self, reader: Guid, writer: Guid, last_sn: int, group_sn: int, now: float) -> None:
@@ -309,6 +320,9 @@ class SubscriberGroup:
     def _publisher(self, name: bytes) -> _Publisher:
         publisher = self._publishers.get(name)
         if publisher is None:
+            idle = [known.name for known in self._publishers.values() if not known.pairs and not known.queue]
+            for forgotten in idle[: max(len(idle) - _MAX_IDLE_PUBLISHERS, 0)]:
+                del self._publishers[forgotten]
             publisher = self._publishers[name] = _Publisher(name)
         return publisher
 
@@ -387,7 +401,7 @@ class SubscriberGroup:
                 return
             publisher.pop()
             self.octets -= unit.octets
-        if not publisher.queue and not publisher.pairs:
+        if not publisher.queue and not publisher.pairs and not publisher.past_sets:
             self._publishers.pop(publisher.name, None)
 
     def _wait_until(self, due: float, now: float) -> None:

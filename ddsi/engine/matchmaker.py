@@ -316,7 +316,7 @@ class Matchmaker:
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_unmatched(guid, now)
-            engine.presentation.writer_unmatched(reader, guid, now)
+            engine.presentation.writer_unmatched(reader, guid, reason, now)
         engine.status(reader.guid, reader.match_changed(guid, -1))
         alive = proxy is None or proxy.is_alive
         engine.status(
@@ -354,7 +354,7 @@ class Matchmaker:
         self._engine.recorder.unmatched(writer.guid, reader.guid, writer.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_unmatched(writer.guid, now)
-            engine.presentation.writer_unmatched(reader, writer.guid, now)
+            engine.presentation.writer_unmatched(reader, writer.guid, reason, now)
         engine.status(writer.guid, writer.match_changed(reader.guid, -1))
         engine.status(reader.guid, reader.match_changed(writer.guid, -1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-int(alive), not_alive=int(alive) - 1))

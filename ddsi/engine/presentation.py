@@ -22,7 +22,7 @@ from ..structure.discovered import DiscoveredWriterData
 from ..structure.guid import EntityId, EntityKind, Guid
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import AccessScope
-from ..trace.reasons import SampleLossReason
+from ..trace.reasons import LossReason, SampleLossReason
 from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
@@ -186,12 +186,18 @@ class Presentation:
         if reader.subscriber is not None and proxy is not None:
             reader.subscriber.writer_matched(reader.guid, proxy)
 
-    def writer_unmatched(self, reader: LocalReader, writer: Guid, now: float) -> None:
+    def writer_unmatched(self, reader: LocalReader, writer: Guid, reason: LossReason, now: float) -> None:
         """What it has begun and not ended is forgotten."""
         if reader.sets is not None:
             reader.sets.writer_unmatched(writer, now)
         if reader.subscriber is not None:
-            reader.subscriber.writer_unmatched(reader.guid, writer, now)
+            reader.subscriber.writer_unmatched(
+                reader.guid,
+                writer,
+                now,
+                has_said_all=reason is LossReason.CLOSED,
+                may_return=reason is LossReason.LEASE_EXPIRED,
+            )
 
     def heartbeat(self, reader: LocalReader, proxy: WriterProxy, heartbeat: Heartbeat, now: float) -> None:
         """It may say how far the writer's publisher is."""

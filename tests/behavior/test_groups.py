@@ -222,12 +222,35 @@ def test_a_writer_that_is_gone_spoils_the_sets_that_it_had_begun_and_is_waited_f
     bench.put(1, 2, 1)
     bench.put(0, 3, 1, end=True)
     bench.sinks[1].writer_unmatched(W[1], 0.0)
-    bench.group.writer_unmatched(R[1], W[1], 0.0)
+    bench.group.writer_unmatched(R[1], W[1], 0.0, has_said_all=True)
     assert (bench.seen(), bench.lost) == ([], 2)
     bench.put(0, 4, 4)
     bench.put(0, 5, 4, end=True)
     bench.put(2, 5, 4, end=True)
     assert bench.seen() == [4]
+
+
+def test_a_writer_that_is_lost_may_have_had_a_part_that_never_came() -> None:
+    for has_said_all, expected in ((True, [1]), (False, [])):
+        bench = Bench()
+        bench.put(0, 1, 1)
+        for who in (0, 2):
+            bench.put(who, 2, 1, end=True)
+        bench.group.writer_unmatched(R[1], W[1], 0.0, has_said_all=has_said_all)
+        assert bench.seen() == expected
+
+
+def test_lost_publishers_are_remembered_up_to_a_bound() -> None:
+    bench = Bench()
+    for number in range(500):
+        stranger = guid(3 + number % 200, 1000 + number)
+        data = DiscoveredWriterData(guid=stranger, topic_name="t", type_name="T", qos=writer_qos(Qos()))
+        proxy = WriterProxy(data, (), is_reliable=True, max_samples=10, max_octets=100)
+        bench.group.writer_matched(R[0], proxy)
+        end = Coherence(0, 2, 1, is_end=True)
+        bench.sinks[0].add(CacheChange(ChangeKind.ALIVE, stranger, 1, b"", coherence=end), 0.0)
+        bench.group.writer_unmatched(R[0], stranger, 0.0, has_said_all=False, may_return=True)
+    assert len(bench.group._publishers) <= 70
 
 
 def test_during_access_nothing_becomes_visible() -> None:

@@ -292,3 +292,30 @@ def test_ends_of_sets_do_not_pile_up_behind_keep_last() -> None:
     view.watch(3)
     for writer in scene.writers:
         assert len(writer.local.behavior.cache) <= 2 * 3, "three instances, and an end for each at most"
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("scope", [TOPIC, GROUP])
+def test_a_network_that_was_cut_within_a_set_leaves_no_half_of_it(seed: int, scope: AccessScope) -> None:
+    """The lease runs out, and the writers return with their history: what comes twice must not come in pieces."""
+    scene = Scene(seed, _coherent(scope), LinkConditions(loss=0.1, jitter=0.01), durability=TransientLocal())
+    view = scene.view()
+    scene.introduce()
+    scene.write_set()
+    with scene.publisher.coherent_changes():
+        members = [scene.write(writer) for writer in scene.writers]
+        scene.domain.run(scene.random.choice((0.0, 0.001, 0.1)))
+        if seed % 2:
+            scene.domain.network.partition([scene.here.host])
+    scene.sets.append(members)
+    if not seed % 2:
+        scene.domain.run(scene.random.choice((0.0, 0.001, 0.005)))
+        scene.domain.network.partition([scene.here.host])
+    view.watch(150)
+    assert not any(reader.local.behavior.writers for reader in view.readers), "the lease has run out"
+    scene.domain.network.heal()
+    scene.introduce()
+    scene.write_set()
+    view.watch(20)
+    assert view.flaws() == []
+    assert set(scene.sets[-1]) <= set(view.seen), "what was written since is seen"
