@@ -1,8 +1,9 @@
 """Which TypeObjects a peer must not be told.
 
-Cyclone DDS 0.10 ends with a segmentation fault when it is told a TypeObject with an int8, a uint8 or a wstring, which
-version 11 reads (found with 0.10.2; it says RTPS 2.1, where later ones say 2.5).  So it gets no such TypeObject from
-us, and as it would wait for that for ever, an endpoint that meets one of its endpoints goes by its type's name.
+Cyclone DDS 0.10 ends with a segmentation fault when it is told a TypeObject with an int8, a uint8 or a wstring, and
+calls a bitset invalid; version 11 reads them.  (Found with 0.10.2.  It says RTPS 2.1, where later ones say 2.5.)  So it
+gets no such TypeObject from us, and as it would wait for that for ever, an endpoint that meets one of its endpoints
+goes by its type's name.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from ..structure.vendor import CYCLONE
 from ..xtypes.type_object import TypeObject
 from ..xtypes.type_object.identifiers import PrimitiveIdentifier, StringIdentifier
 from ..xtypes.type_object.kinds import TypeKind
+from ..xtypes.type_object.objects import BitsetObject
 from ..xtypes.type_object.references import plain_parts
 
 __all__ = ["has_new_kinds", "knows_old_kinds_alone"]
@@ -27,7 +29,7 @@ def knows_old_kinds_alone(peer: DiscoveredParticipantData) -> bool:
 
 def has_new_kinds(type_object: TypeObject) -> bool:
     """Is this one of those TypeObjects?"""
-    return any(
+    return isinstance(type_object.body, BitsetObject) or any(
         part.wide if isinstance(part, StringIdentifier) else part.kind in _NEW_KINDS
         for part in plain_parts(type_object)
         if isinstance(part, (StringIdentifier, PrimitiveIdentifier))
