@@ -24,6 +24,7 @@ from ..engine import (
     DiscoveryChanged,
     Effect,
     LocalWriter,
+    MatchRefused,
     StatusChanged,
     WriterProgress,
     participant_data,
@@ -41,6 +42,7 @@ from .endpoint import Endpoint
 from .entity import Entity, Parent, deadline_scope
 from .explaining import explain_all
 from .lifetime import Lifetime
+from .refusal_log import RefusalLog
 from .topic import Topic
 from .type_access import AnnouncedEndpoint, fetch_type_object, fetch_type_objects
 from .type_discovery import endpoint_type, find_type
@@ -92,6 +94,7 @@ class DomainParticipant(Parent):
         self._lifetime: Lifetime | None = None
         self._by_guid: dict[Guid, Entity] = {}
         self._discovery_lot = trio.lowlevel.ParkingLot()
+        self._refusal_log = RefusalLog()
         self._dynamic_types: WeakValueDictionary[tuple[str, bytes], type[Any]] = WeakValueDictionary()
 
     def __repr__(self) -> str:
@@ -379,6 +382,9 @@ class DomainParticipant(Parent):
                     entity._status_changed(status)
                 if isinstance(status, SecurityRevoked):
                     self._end_revoked(status.reason)
+            case MatchRefused(local, remote):
+                if self._pump is not None:
+                    self._refusal_log.tell(self._pump.engine, local, remote)
             case DiscoveryChanged():
                 self._discovery_lot.unpark_all()
 

@@ -3,7 +3,16 @@
 from .alarms import Timer
 from .builtin_topic_data import participant_data, publication_data, subscription_data
 from .builtin_topic_readers import BuiltinTopicChange, LocalBuiltinTopicReader
-from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
+from .effects import (
+    Compute,
+    DataAvailable,
+    DiscoveryChanged,
+    Effect,
+    MatchRefused,
+    SendDatagram,
+    StatusChanged,
+    WriterProgress,
+)
 from .local_endpoints import KeyCodec, LocalReader, LocalWriter
 from .participant import Participant, ParticipantSetup
 
@@ -17,6 +26,7 @@ __all__ = [
     "LocalBuiltinTopicReader",
     "LocalReader",
     "LocalWriter",
+    "MatchRefused",
     "Participant",
     "ParticipantSetup",
     "SendDatagram",

@@ -13,7 +13,16 @@ from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import Status
 
-__all__ = ["Compute", "DataAvailable", "DiscoveryChanged", "Effect", "SendDatagram", "StatusChanged", "WriterProgress"]
+__all__ = [
+    "Compute",
+    "DataAvailable",
+    "DiscoveryChanged",
+    "Effect",
+    "MatchRefused",
+    "SendDatagram",
+    "StatusChanged",
+    "WriterProgress",
+]
 
 Octets = bytes | bytearray | memoryview
 
@@ -53,6 +62,14 @@ class StatusChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class MatchRefused:
+    """An endpoint of ours and another of its topic do not match, and that is news: tell whoever reads the log."""
+
+    local: Guid
+    remote: Guid
+
+
+@dataclass(frozen=True, slots=True)
 class DiscoveryChanged:
     """The tables of remote participants and endpoints changed: wake who watches them."""
 
@@ -65,4 +82,4 @@ class Compute:
     computed: Callable[[object, float], None] = field(repr=False)
 
 
-Effect = SendDatagram | DataAvailable | WriterProgress | StatusChanged | DiscoveryChanged | Compute
+Effect = SendDatagram | DataAvailable | WriterProgress | StatusChanged | MatchRefused | DiscoveryChanged | Compute

@@ -85,10 +85,15 @@ def explain_endpoints(engine: Participant, guids: tuple[Guid, ...], now: float) 
 
 
 def judged_pair(
-    engine: Participant, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float
+    engine: Participant,
+    writer: DiscoveredWriterData,
+    reader: DiscoveredReaderData,
+    now: float,
+    *,
+    may_ask: bool = True,
 ) -> PairExplanation:
-    """Everything that stands between the two."""
-    types = _judged_types(engine, writer, reader, now)
+    """Everything that stands between the two.  ``may_ask``: others may be asked what their types are made of."""
+    types = _judged_types(engine, writer, reader, now, may_ask)
     found = (
         *disagreements(writer, reader, types.refusal),
         *_security(engine, writer, reader),
@@ -99,15 +104,15 @@ def judged_pair(
 
 
 def _judged_types(
-    engine: Participant, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float
+    engine: Participant, writer: DiscoveredWriterData, reader: DiscoveredReaderData, now: float, may_ask: bool
 ) -> TypeVerdict:
     """As the matchmaker has it; where a member is at fault, by types that have its name, if they are to be had."""
-    types = engine.type_matching.judge(writer, reader, now, may_ask=True)
+    types = engine.type_matching.judge(writer, reader, now, may_ask=may_ask)
     if types.refusal is None or not types.refusal.detail:
         return types
-    named = engine.type_matching.judge(writer, reader, now, may_ask=True, names_members=True)
+    named = engine.type_matching.judge(writer, reader, now, may_ask=may_ask, names_members=True)
     has_name = named.refusal is not None and bool(named.refusal.detail)
-    return named if named.is_awaited or has_name else types
+    return named if has_name or (named.is_awaited and may_ask) else types
 
 
 class _Judge:

@@ -405,6 +405,7 @@ class Matchmaker:
             return False
         self.refusals[(local, remote)] = refusal
         self._engine.recorder.refused(local, remote, topic_name, refusal)
+        self._engine.match_refused(local, remote)
         return True
 
     def _note_matched(self, local: Guid, remote: Guid, topic_name: str) -> None:

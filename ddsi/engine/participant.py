@@ -70,7 +70,16 @@ from .alarms import Alarms
 from .builtin_topic_readers import BuiltinTopicReaders
 from .builtin_topics import BuiltinTopics
 from .discovery_agent import DiscoveryAgent
-from .effects import Compute, DataAvailable, DiscoveryChanged, Effect, SendDatagram, StatusChanged, WriterProgress
+from .effects import (
+    Compute,
+    DataAvailable,
+    DiscoveryChanged,
+    Effect,
+    MatchRefused,
+    SendDatagram,
+    StatusChanged,
+    WriterProgress,
+)
 from .inbound import Inbound
 from .liveliness import Liveliness
 from .local_delivery import LocalDelivery
@@ -588,6 +597,9 @@ class Participant:
     def status(self, entity: Guid, status: Status) -> None:
         self._effects.append(StatusChanged(entity, status))
         self.recorder.status(entity, status)
+
+    def match_refused(self, local: Guid, remote: Guid) -> None:
+        self._effects.append(MatchRefused(local, remote))
 
     def data_available(self, reader: Guid) -> None:
         self._effects.append(DataAvailable(reader))

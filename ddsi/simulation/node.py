@@ -17,6 +17,7 @@ from ..engine import (
     Compute,
     DataAvailable,
     DiscoveryChanged,
+    MatchRefused,
     Participant,
     ParticipantSetup,
     SendDatagram,
@@ -266,6 +267,8 @@ class Node:
                         self.discovery_changes += 1
                     case WriterProgress():
                         pass  # nobody waits: a write that finds no room is refused
+                    case MatchRefused():
+                        pass  # the trace tells it
         self._arm()
 
     def statuses_of(self, kind: type[Status]) -> list[Status]:
