@@ -1,7 +1,7 @@
 """Coherent sets: what was written together is seen together, over topics, or not at all.
 
 A robot publishes where it is and which way it looks on two topics, always both in one set; the last time something
-goes wrong in the middle, and the set is withdrawn.  Nobody who asks for coherent access sees a place without its heading.
+goes wrong in the middle, and the set is withdrawn.  Who asks for coherent access never sees a place without a heading.
 
 You will see four poses, each of both topics, and not the fifth.
 

@@ -59,7 +59,7 @@ class _Parser(argparse.ArgumentParser):
 
     is_intermixed = False
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         if not self.is_intermixed:
             return super().parse_known_args(args, namespace)
         self.is_intermixed = False  # what follows calls this

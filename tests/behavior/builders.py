@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ddsi.behavior.filtering_writer import FilteringWriter
 from ddsi.behavior.stateful_reader import StatefulReader
 from ddsi.behavior.stateful_writer import StatefulWriter
@@ -91,7 +93,7 @@ def numbers(base: int, *members: int) -> NumberSet:
     return NumberSet.of(base, members)
 
 
-def shape(transmissions: list[WriterTransmission]) -> list[str]:
+def shape(transmissions: Sequence[WriterTransmission]) -> list[str]:
     """What is to be sent, as short words: ``DATA 3``, ``DATA 3 to 2``, ``GAP 1-3 to 2``, ``HB 1-4 ? to 2`` (? asks)."""
     return [_word(transmission) for transmission in transmissions]
 

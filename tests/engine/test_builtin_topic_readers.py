@@ -9,10 +9,10 @@ from ddsi.simulation import Domain
 from ddsi.spi import PENDING, Admission, Decided, HookEffect, Refused
 from ddsi.spi.plaintext import Plaintext
 from ddsi.structure.builtin_topic_data import (
-    BuiltinTopicData,
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
     SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
 )
 from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReaderData, DiscoveredWriterData
 from ddsi.structure.guid import Guid
@@ -27,12 +27,16 @@ ALIVE, DISPOSED = InstanceState.ALIVE, InstanceState.NOT_ALIVE_DISPOSED
 NO_WRITERS = InstanceState.NOT_ALIVE_NO_WRITERS
 
 
-def taken(reader: LocalBuiltinTopicReader) -> list[tuple[BuiltinTopicData, InstanceState]]:
+SecuredData = ParticipantBuiltinTopicData | PublicationBuiltinTopicData | SubscriptionBuiltinTopicData
+
+
+def taken(reader: LocalBuiltinTopicReader) -> list[tuple[SecuredData, InstanceState]]:
     """What is new in it: the data, and what became of the instance."""
     reader.history.seen()
     found = []
     for info, change in reader.history.take():
         assert isinstance(change, BuiltinTopicChange)
+        assert not isinstance(change.data, TopicBuiltinTopicData), "topics have readers of another kind"
         assert info.instance_handle == change.data.key
         assert info.publication_handle == change.data.key.participant
         found.append((change.data, info.instance_state))

@@ -68,7 +68,8 @@ def overheard(policy: Presentation) -> Overheard:
     domain.network.watch = heard
     a.write()
     with publisher.coherent_changes():
-        a.write(), b.write(), a.write()
+        for writer in (a, b, a):
+            writer.write()
     b.write()
     domain.run(1)
     return heard

@@ -275,7 +275,8 @@ def test_history_that_keeps_too_little_for_a_set_costs_late_joiners_the_set() ->
     scene = Scene(1, _coherent(TOPIC), LinkConditions(), durability=TransientLocal(), history=KeepLast(1))
     red, green, _ = scene.writers
     with scene.publisher.coherent_changes():
-        red.write(key=1), red.write(key=2), green.write(key=1)
+        for writer, key in ((red, 1), (red, 2), (green, 1)):
+            writer.write(key=key)
     red.write(key=1)
     view = scene.view()
     view.watch(5)

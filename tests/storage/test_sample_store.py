@@ -133,7 +133,7 @@ def test_what_was_committed_survives_sigkill(tmp_path: Path) -> None:
         "store = SampleStore(sys.argv[1]); store.add_topic(TOPIC); add(store, 1); store.commit(); add(store, 2)\n"
         "os.kill(os.getpid(), signal.SIGKILL)"
     )
-    command = [sys.executable, "-c", program, path]
+    command = [sys.executable, "-c", program, str(path)]
     ended = subprocess.run(command, check=False, cwd=Path(__file__).parents[2], env=os.environ)
     assert ended.returncode == -signal.SIGKILL
     store = SampleStore(path)

@@ -6,7 +6,7 @@ Lines: ``strength N``, ``write NUMBER``, ``end``; of others it says REFUSED.  El
 """
 
 # mypy: ignore-errors
-# pyright: basic
+# pyright: basic, reportArgumentType=false
 
 import os
 import select

@@ -4,7 +4,7 @@ cyclonedds_durable pub|sub DOMAIN COUNT
 """
 
 # mypy: ignore-errors
-# pyright: basic
+# pyright: basic, reportArgumentType=false
 
 import sys
 import time

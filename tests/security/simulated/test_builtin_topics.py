@@ -18,10 +18,10 @@ from ddsi.engine import (
 )
 from ddsi.simulation import Domain, Node
 from ddsi.structure.builtin_topic_data import (
-    BuiltinTopicData,
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
     SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
 )
 from ddsi.structure.errors import NotAllowedBySecurity
 from ddsi.structure.guid import Guid
@@ -60,11 +60,15 @@ class Window:
         )
 
 
-def taken(reader: LocalBuiltinTopicReader) -> dict[Guid, tuple[BuiltinTopicData, InstanceState]]:
+SecuredData = ParticipantBuiltinTopicData | PublicationBuiltinTopicData | SubscriptionBuiltinTopicData
+
+
+def taken(reader: LocalBuiltinTopicReader) -> dict[Guid, tuple[SecuredData, InstanceState]]:
     """The latest of each entity."""
     found = {}
     for info, change in reader.history.take():
         assert isinstance(change, BuiltinTopicChange)
+        assert not isinstance(change.data, TopicBuiltinTopicData), "topics have no security"
         found[change.data.key] = (change.data, info.instance_state)
     return found
 
