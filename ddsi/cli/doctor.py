@@ -1,7 +1,8 @@
 """``ddsi doctor``: is this host fit for DDS, and if not, what to do.
 
 It looks at the versions, the configuration, the interfaces, the sockets, multicast and buffers, as a participant with
-this configuration would meet them.  Whom it can reach is ``ddsi ls``'s business.
+this configuration would meet them, and at the ports, filters and the clock of the host.  Nothing is sent on an
+interface that the configuration does not choose.
 """
 
 from __future__ import annotations
@@ -11,8 +12,6 @@ import json
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import StrEnum
 from importlib import metadata
 
 from ..config import Config
@@ -28,8 +27,12 @@ from ..transport.self_test import (
     unicast_returns,
 )
 from ..transport.udp import UdpTransport
-from .arguments import add_domain, add_json
+from .arguments import add_domain, add_json, seconds
+from .doctor_host import host_findings
+from .doctor_peers import peer_findings
 from .exit_status import ExitStatus
+from .finding import Finding, Verdict
+from .runner import run as run_async
 from .terminal import uses_colour
 
 __all__ = ["SUMMARY", "Finding", "Verdict", "add_arguments", "examine", "run"]
@@ -44,26 +47,12 @@ _COLOURS = {"ok": "\x1b[32m", "warning": "\x1b[33m", "fault": "\x1b[31m"}
 _RESET = "\x1b[0m"
 
 
-class Verdict(StrEnum):
-    OK = "ok"
-    WARNING = "warning"
-    """It works, but not as well as it could, or not for everybody."""
-    FAULT = "fault"
-    """A participant cannot work like this."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that was looked at; ``advice`` is empty where there is nothing to do."""
-
-    subject: str
-    verdict: Verdict
-    text: str
-    advice: str = ""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_domain(parser)
+    parser.add_argument(
+        "--peer", action="append", default=[], metavar="HOST", help="does a participant there answer?  Repeatable"
+    )
+    parser.add_argument("--time", type=seconds, metavar="SECONDS", help="how long to wait for a peer (default: 2)")
     add_json(parser)
 
 
@@ -73,6 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         findings.append(finding)
         if not arguments.json:
             _print(finding)
+    if arguments.peer and not any(finding.verdict is Verdict.FAULT for finding in findings):
+        run_async(lambda: _examine_peers(arguments, findings))
     faults = sum(finding.verdict is Verdict.FAULT for finding in findings)
     warnings = sum(finding.verdict is Verdict.WARNING for finding in findings)
     if arguments.json:
@@ -89,6 +80,18 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         print(f"{count_text(faults, 'fault')}, {count_text(warnings, 'warning')}.")
     return ExitStatus.NOT_AS_HOPED if faults else ExitStatus.OK
+
+
+async def _examine_peers(arguments: argparse.Namespace, findings: list[Finding]) -> int:
+    config = load_config(arguments.domain)
+    transport = UdpTransport(arguments.domain, config)
+    interfaces = tuple(transport.interfaces)
+    transport.close()
+    async for finding in peer_findings(arguments.domain, config, interfaces, arguments.peer, arguments.time):
+        findings.append(finding)
+        if not arguments.json:
+            _print(finding)
+    return ExitStatus.OK
 
 
 def _print(finding: Finding) -> None:
@@ -119,6 +122,7 @@ def examine(domain_id: int) -> Iterator[Finding]:
         for interface in transport.interfaces:
             yield from _datagrams(interface, config, transport)
         yield from _buffers(transport)
+        yield from host_findings(domain_id, config, transport)
     finally:
         transport.close()
 

@@ -22,6 +22,7 @@ __all__ = [
     "list_interfaces",
     "open_network_events",
     "receive_only_joined_groups",
+    "resolve",
 ]
 
 _ETHERNET_MTU = 1500
@@ -165,3 +166,11 @@ def enlarge_buffer(sock: socket.socket, option: int, wanted: int | None) -> int:
 def bind_address_for_group(group: str) -> str:
     """Where to bind a multicast socket: to the group, so that other traffic to the port stays away; Windows cannot."""
     return "" if sys.platform == "win32" else group
+
+
+def resolve(host: str) -> str | None:
+    """The host's first IPv4 address; None if it has none, or nobody knows it."""
+    try:
+        return socket.gethostbyname(host)
+    except (OSError, UnicodeError):
+        return None

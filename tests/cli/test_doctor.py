@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
+import subprocess
+import sys
 
 import pytest
+import trio
 
-from ddsi.cli import doctor, main
+import ddsi
+from ddsi.cli import doctor, doctor_host, doctor_peers, main
 from ddsi.cli.doctor import Finding, Verdict, examine
+from ddsi.cli.doctor_peers import peer_findings
 from ddsi.config import Config
 from ddsi.config.environment import load_config
+from ddsi.transport.host_facts import PortHolder, port_holders, probe_port, source_towards
 from ddsi.transport.platform import Interface
 from ddsi.transport.self_test import multicast_returns, unicast_returns
 
@@ -36,6 +43,7 @@ def test_a_sound_host() -> None:
     found = _findings()
     assert list(found) == [
         "versions", "configuration", "interface", "sockets", "reach", "unicast", "multicast", "buffers",
+        "ports", "filter", "fragments", "ipv6", "clock",
     ]  # fmt: skip
     assert found["versions"].text.startswith("Python 3.")
     assert "interfaces=('127.0.0.1',)" in found["configuration"].text
@@ -140,3 +148,104 @@ def test_json_and_status(capsys: pytest.CaptureFixture[str], monkeypatch: pytest
     monkeypatch.setenv("DDSI_URI", "<nonsense")
     assert main(["doctor"]) == 1
     assert capsys.readouterr().out.endswith("1 fault, 0 warnings.\n")
+
+
+# --- the host --------------------------------------------------------------------------------------------------
+
+
+def test_who_holds_a_port_is_another_process_by_name() -> None:
+    """Our own sockets are not somebody else's."""
+    program = "import socket, sys; s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(('127.0.0.1', 0)); "
+    program += "print(s.getsockname()[1], flush=True); sys.stdin.read()"
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        port = int(other.stdout.readline())
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+            own.bind(("127.0.0.1", 0))
+            (holder,) = port_holders([port, own.getsockname()[1]])
+        other.communicate()
+    assert (holder.port, holder.address) == (port, "127.0.0.1")
+    assert holder.process.endswith(f"({other.pid})")
+
+
+@pytest.mark.parametrize(("count", "verdict"), [(0, "ok"), (3, "ok"), (9, "warning")])
+def test_participant_indices_that_are_taken(count: int, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten indices, one of which doctor itself would get."""
+    held = [PortHolder(7400 + 250 * 173 + 10 + 2 * index, "127.0.0.1", "talker (17)") for index in range(count)]
+    monkeypatch.setattr(doctor_host, "port_holders", lambda ports: held)
+    finding = _findings()["ports"]
+    assert finding.verdict == verdict
+    assert ("0 (port 50660) by talker (17)" in finding.text) == bool(count)
+    assert ("MaxAutoParticipantIndex" in finding.advice) == (verdict == "warning")
+
+
+def test_signs_of_a_packet_filter_come_with_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor_host, "packet_filter_signs", lambda: ["iptables filter"])
+    assert "nft list ruleset" in _findings()["filter"].advice
+    monkeypatch.setattr(doctor_host, "packet_filter_signs", list)
+    assert _findings()["filter"].advice == ""
+
+
+def test_fragments_that_find_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor_host, "fragment_memory", lambda: 262_144)
+    narrow = doctor_host._fragments(65_000, [NOWHERE])
+    assert narrow.verdict is Verdict.WARNING
+    assert "ipfrag_high_thresh=4194304" in narrow.advice
+    assert doctor_host._fragments(1400, [NOWHERE]).text == "messages of up to 1400 octets go unfragmented"
+
+
+@pytest.mark.parametrize(("answer", "verdict"), [(None, "ok"), (True, "ok"), (False, "warning")])
+def test_the_clock(answer: bool | None, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor_host, "is_clock_synchronized", lambda: answer)
+    assert _findings()["clock"].verdict == verdict
+
+
+# --- peers -----------------------------------------------------------------------------------------------------
+
+
+def _peer(host: str, domain: int = 171) -> Finding:
+    """What is found of that host, with a participant in domain 172 on the loopback."""
+
+    async def ask() -> Finding:
+        config = ddsi.Config(interfaces=("127.0.0.1",))
+        async with ddsi.DomainParticipant(172, config=config):
+            findings = [one async for one in peer_findings(domain, config, (LOOPBACK,), [host], 0.5)]
+        (finding,) = findings
+        return finding
+
+    return trio.run(ask)
+
+
+def test_a_peer_that_answers() -> None:
+    finding = _peer("127.0.0.1", domain=172)
+    assert finding.verdict is Verdict.OK
+    assert re.fullmatch(r"127.0.0.1: \d+ participants? of domain 172 answered", finding.text)
+
+
+def test_a_peer_on_which_nobody_listens() -> None:
+    finding = _peer("127.0.0.1")
+    assert finding.verdict is Verdict.FAULT
+    assert "the host answers, but nobody listens on port 50160" in finding.text
+
+
+def test_nothing_is_sent_on_an_interface_that_is_not_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor_peers, "source_towards", lambda address: "192.0.2.2")
+    monkeypatch.setattr(doctor_peers, "_of_host", None)  # who would send
+    finding = _peer("198.51.100.77")
+    assert finding.verdict is Verdict.FAULT
+    assert "would leave from 192.0.2.2; the configuration chooses lo alone" in finding.text
+
+
+def test_a_name_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor_peers, "resolve", lambda host: None)
+    assert "no IPv4 address of that name" in _peer("robot.example").text
+
+
+def test_a_port_on_which_nobody_listens_is_refused_by_the_host() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        assert probe_port("127.0.0.1", "127.0.0.1", port) is None
+    assert probe_port("127.0.0.1", "127.0.0.1", port) is False
+    assert source_towards("127.0.0.1") == "127.0.0.1"
