@@ -165,7 +165,7 @@ class Alarms:
             case Timer.TYPE_LOOKUP:
                 engine.types.answer_overdue(subjects[0], now)
             case Timer.SECURITY:
-                engine.hooks_timer_fired()
+                engine.hook_effects.timer_fired()
                 engine.hooks.handle_timeout(now)
             case _:
                 writer = engine.local_writers.get(subjects[0])

@@ -16,7 +16,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
-from functools import partial
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -37,17 +36,10 @@ from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.header import Header
 from ..spi import (
     PLAINTEXT,
-    Admission,
-    Decided,
-    HookEffect,
     LocalParticipant,
     Octets,
-    Publish,
-    Revoked,
     SecurityHooks,
-    SendMessage,
 )
-from ..spi import Compute as HookCompute
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.dataclass import dataclass
 from ..structure.discovered import (
@@ -56,22 +48,20 @@ from ..structure.discovered import (
     DiscoveredReaderData,
     DiscoveredWriterData,
 )
-from ..structure.errors import NotAllowedBySecurity
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import BinaryProperty, KeepAll, Properties, Property, Volatile
-from ..structure.status import SecurityRevoked, Status
+from ..structure.status import Status
 from ..structure.time import ticks_from_nanoseconds
 from ..structure.vendor import PROTOCOL_VERSION
-from ..trace.reasons import DropReason, LossReason, SampleLossReason, SecurityStep
+from ..trace.reasons import DropReason, SampleLossReason
 from .admission import AdmissionDesk
 from .alarms import Alarms
 from .builtin_topic_readers import BuiltinTopicReaders
 from .builtin_topics import BuiltinTopics
 from .discovery_agent import DiscoveryAgent
 from .effects import (
-    Compute,
     DataAvailable,
     DiscoveryChanged,
     Effect,
@@ -80,6 +70,7 @@ from .effects import (
     StatusChanged,
     WriterProgress,
 )
+from .hook_effects import HookEffects
 from .inbound import Inbound
 from .liveliness import Liveliness
 from .local_delivery import LocalDelivery
@@ -163,7 +154,7 @@ class Participant:
         self.recorder = Recorder(self, trace)
         self.alarms = Alarms(self)
         self._effects: list[Effect] = []
-        self._hooks_deadline = math.inf
+        self.hook_effects = HookEffects(self, self._effects.append)
         self._next_entity_key = 1
         self._is_closed = False
         self.drops: Counter[DropReason] = Counter()
@@ -175,7 +166,6 @@ class Participant:
         self.user_endpoints = UserEndpoints(self)
         self.remote_writers: dict[bytes, RemoteWriter] = {}
         self.closing: set[Guid] = set()
-        self._hook_writers: dict[str, LocalWriter] = {}
         self.defrag_budget = DefragBudget(setup.config.max_defrag_octets)
         self.stateless_defrag_budget = DefragBudget(_STATELESS_DEFRAG_OCTETS)
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
@@ -264,7 +254,7 @@ class Participant:
         """Everything to be done now, in order.  Open messages are closed first: nothing waits behind this call."""
         self.flush()
         if not self._is_closed:
-            self._act_on_hook_effects()
+            self.hook_effects.act()
         if not self._effects:
             return []
         effects = list(self._effects)
@@ -276,6 +266,10 @@ class Participant:
         effects = list(self._effects)
         self._effects.clear()
         return effects
+
+    @property
+    def is_closed(self) -> bool:
+        return self._is_closed
 
     @property
     def has_effects(self) -> bool:
@@ -661,72 +655,6 @@ class Participant:
         answers = reader.behavior.handle_timeout(proxy, self.remote_writers.get(writer_guid), now)
         self.outbound.answer(reader_guid, proxy, answers)
         self.proxy_touched(reader.behavior, proxy)
-
-    # --- what the hooks want ------------------------------------------------------------------------------
-
-    def hooks_timer_fired(self) -> None:
-        """The hooks' deadline is no longer armed, whatever it was."""
-        self._hooks_deadline = math.inf
-
-    def _act_on_hook_effects(self) -> None:
-        """Until they want nothing more: a match that they admit may bring keys that are to be sent."""
-        while effects := self.hooks.drain_effects():
-            for effect in effects:
-                self._act_on_hook_effect(effect)
-            self.flush()
-        deadline = self.hooks.next_deadline()
-        if deadline != self._hooks_deadline:
-            self._hooks_deadline = deadline
-            self.alarms.security(deadline)
-
-    def _act_on_hook_effect(self, effect: HookEffect) -> None:
-        match effect:
-            case SendMessage(writer_id, change):
-                self._send_generic_message(self.local_writers[Guid.of(self.guid.prefix, writer_id)], change)
-            case Publish():
-                self._publish(effect)
-            case HookCompute():
-                self._effects.append(Compute(effect.job, partial(self._computed, effect)))
-            case Decided(local, remote, admission):
-                self._decided(local, remote, admission)
-            case Revoked(reason):
-                self.status(self.guid, SecurityRevoked(reason=reason))
-                self.recorder.security(None, SecurityStep.REVOKED, reason)
-
-    def _computed(self, effect: HookCompute, result: object, now: float) -> None:
-        """A job has come back; whether anybody still waits for it, the hooks tell by its generation."""
-        self.now = now
-        if not self._is_closed:
-            self.hooks.computed(effect, result, now)
-
-    def _send_generic_message(self, writer: LocalWriter, change: CacheChange) -> None:
-        """What the hooks have to tell another participant; one that never acknowledges is given up."""
-        destination, behavior = change.destination, writer.behavior
-        if isinstance(behavior, FilteringWriter) and behavior.has_overflow(destination):
-            self.discovery.participant_lost(destination, LossReason.UNRESPONSIVE, self.now)
-            return
-        self.write(writer, change.kind, bytes(change.payload), change.key, self.now, destination=destination)
-
-    def _publish(self, effect: Publish) -> None:
-        """What the hooks have to tell everybody, with a writer of theirs on that topic."""
-        writer = self._hook_writers.get(effect.topic_name)
-        if writer is None:
-            try:
-                writer = self.create_writer(effect.topic_name, effect.type_name, effect.qos, self.now, is_keyed=False)
-            except NotAllowedBySecurity:
-                return
-            self._hook_writers[effect.topic_name] = writer
-        if writer.guid in self.local_writers and writer.behavior.lacks_room(len(effect.payload), b"") is None:
-            self.write(writer, ChangeKind.ALIVE, effect.payload, b"", self.now)
-
-    def _decided(self, local: Guid, remote: Guid, admission: Admission) -> None:
-        if local != self.guid:
-            pairs = self.builtin if local.entity_id.is_builtin else self.matchmaker
-            pairs.decided(local, remote, admission, self.now)
-            return
-        proxy = self.participants.get(remote[:12])
-        if proxy is not None:
-            self.admission.decided(proxy, admission, self.now)
 
     # --- making endpoints --------------------------------------------------------------------------------
 
