@@ -232,3 +232,30 @@ async def test_a_participant_that_wants_an_identity() -> None:
     assert "this one has none" in trouble["requested"]
     assert "ddsi why --secure DIR" in trouble["remedy"]
     assert "security: it announces an identity" in text
+
+
+@pytest.mark.peers
+@async_test
+async def test_governance_that_differs_is_named_to_who_may_look() -> None:
+    """Cyclone DDS's writer protects payloads alone, its reader submessages: an observer with rights sees both."""
+    store = shared_keystore().folder
+    files = {
+        "auth.identity_ca": "identity_ca.pem",
+        "auth.identity_certificate": "bob.pem",
+        "auth.private_key": "bob.key",
+        "access.permissions_ca": "permissions_ca.pem",
+        "access.governance": "data.p7s",
+        "access.permissions": "bob.permissions.p7s",
+    }
+    rights = [word for name, file in files.items() for word in ("--property", f"dds.sec.{name}=file:{store}/{file}")]
+    with namespace() as host:
+        async with scenario("why: governance", deadline=120) as stage:
+            await shapes(CYCLONE_C, keystore=str(store), governance="data.p7s")(stage, host, "pub")
+            await shapes(CYCLONE_C, keystore=str(store), governance="metadata.p7s")(stage, host, "sub")
+            form, _ = await why(stage, host, "Square", "--time", "8", *rights)
+    (mismatch,) = form["mismatches"]
+    (cause,) = mismatch["disagreements"]
+    assert (mismatch["kind"], cause["policy"]) == ("security", "security")
+    assert "payload" in cause["offered"]
+    assert "submessage" in cause["requested"]
+    assert "one governance document" in cause["remedy"]
