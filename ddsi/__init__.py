@@ -49,6 +49,8 @@ from .dcps import (
     Topic,
     WaitSet,
 )
+from .discovery.explanation import Explanation, LonelyTopic, PairExplanation, ParticipantTrouble
+from .discovery.remedies import Disagreement
 from .structure.builtin_topic_data import (
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
@@ -188,6 +190,7 @@ __all__ = [
     "DdsError",
     "DdsTimeout",
     "Deadline",
+    "Disagreement",
     "DomainParticipant",
     "DurabilityService",
     "EndpointQos",
@@ -196,6 +199,7 @@ __all__ = [
     "EntityFactory",
     "EventStream",
     "Exclusive",
+    "Explanation",
     "GroupData",
     "GuardCondition",
     "Guid",
@@ -210,6 +214,7 @@ __all__ = [
     "Lifespan",
     "LivelinessChanged",
     "LivelinessLost",
+    "LonelyTopic",
     "MalformedSample",
     "ManualByParticipant",
     "ManualByTopic",
@@ -220,8 +225,10 @@ __all__ = [
     "OfferedIncompatibleQos",
     "OutOfResources",
     "OwnershipStrength",
+    "PairExplanation",
     "ParticipantBuiltinTopicData",
     "ParticipantSecurity",
+    "ParticipantTrouble",
     "Partition",
     "PersistenceService",
     "Persistent",
