@@ -7,15 +7,15 @@ before anything else is done with them; and at writers of other participants, wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 from weakref import WeakSet
 
 from ..behavior.content_filter import SQL_FILTER_CLASS, CompileFilter, Evaluate
 from ..structure.discovered import ContentFilterProperty
 from ..structure.errors import BadParameter, PreconditionNotMet
 from ..xtypes.type_support import TypeSupport
-from .entity import Entity
 from .topic import Topic
+from .topic_description import TopicDescription
 
 if TYPE_CHECKING:
     from .data_reader import DataReader
@@ -27,7 +27,7 @@ T = TypeVar("T")
 _MAX_OCTETS = 32_000  # of names, expression and parameters, which have to fit one announcement
 
 
-class ContentFilteredTopic(Entity, Generic[T]):
+class ContentFilteredTopic(TopicDescription[T]):
     """Given to a DataReader in a Topic's place, lets it see only what passes: ``"size > %0 AND color = 'RED'"``.
 
     Members are named as in the IDL, nested ones ``place.x``, elements ``path[0]``; enumerators and texts stand between
@@ -50,17 +50,12 @@ class ContentFilteredTopic(Entity, Generic[T]):
         Raises BadParameter, saying where and why, for an expression that cannot be meant, names what the type has
         not, or lacks a parameter; PreconditionNotMet for another participant's topic.
         """
-        super().__init__(None)
         if not isinstance(topic, Topic):
             raise BadParameter(f"a ContentFilteredTopic is made of a ddsi.Topic, not {topic!r}")
-        if not isinstance(name, str) or not 1 <= len(name.encode()) <= 255 or "\0" in name:
-            raise BadParameter(f"a topic's name is a str of 1 to 255 octets without NUL, not {name!r}")
-        participant._running_pump()
+        super().__init__(participant, name, topic.type_support, None)
         topic._check_open()
         if topic.participant is not participant:
             raise PreconditionNotMet(f"{topic!r} was made with {topic.participant!r}; make one with {participant!r}")
-        self._participant = participant
-        self._name = name
         self._related_topic: Topic[T] = topic
         self._compile = filter_compiler(topic.type_support)
         self._announced, self._evaluate = self._checked(expression, parameters)
@@ -71,25 +66,9 @@ class ContentFilteredTopic(Entity, Generic[T]):
         return f"<ContentFilteredTopic {self._name!r} of {self._related_topic.name!r}: {self.filter_expression!r}>"
 
     @property
-    def participant(self) -> DomainParticipant:
-        return self._participant
-
-    @property
-    def name(self) -> str:
-        """Its own; samples are those of the related topic."""
-        return self._name
-
-    @property
     def related_topic(self) -> Topic[T]:
+        """Whose samples they are; the name of this one is its own."""
         return self._related_topic
-
-    @property
-    def type(self) -> type[T]:
-        return self._related_topic.type
-
-    @property
-    def type_name(self) -> str:
-        return self._related_topic.type_name
 
     @property
     def filter_expression(self) -> str:
@@ -132,9 +111,6 @@ class ContentFilteredTopic(Entity, Generic[T]):
                 f"{self._name!r}: expression and parameters have at most {_MAX_OCTETS} octets, and no NUL"
             )
         return announced, evaluate
-
-    def _on_close(self) -> None:
-        self._participant._disown(self)
 
 
 def filter_compiler(support: TypeSupport[T]) -> CompileFilter:

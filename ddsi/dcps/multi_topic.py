@@ -6,13 +6,13 @@ A :class:`~ddsi.MultiTopicReader` reads of it; nobody writes to it, and nothing 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
 from ..structure.errors import BadParameter
-from ..xtypes.type_support import TypeSupport, type_support
-from .entity import Entity
+from ..xtypes.type_support import type_support
 from .topic import Topic
+from .topic_description import TopicDescription
 
 if TYPE_CHECKING:
     from .multi_topic_reader import MultiTopicReader
@@ -23,7 +23,7 @@ __all__ = ["MultiTopic"]
 T = TypeVar("T")
 
 
-class MultiTopic(Entity, Generic[T]):
+class MultiTopic(TopicDescription[T]):
     """``"SELECT flight, x, y, airline AS name FROM Position NATURAL JOIN Plan WHERE x < %0"``.
 
     A natural join brings together the samples that agree in all members of the same name; the topics have one at least
@@ -43,15 +43,9 @@ class MultiTopic(Entity, Generic[T]):
 
         Raises BadParameter, saying where and why, for what cannot be meant or does not fit the types, AlreadyDeleted.
         """
-        super().__init__(None)
-        participant._running_pump()
+        super().__init__(participant, name, type_support(type_), None)
         from ..xtypes.sql import JoinPlan, checked_parameters, parse_topic_expression  # few programs join
 
-        if not isinstance(name, str) or not name:
-            raise BadParameter(f"a topic's name is a str, not {name!r}")
-        self._participant = participant
-        self._name = name
-        self._type_support: TypeSupport[T] = type_support(type_)
         parsed = parse_topic_expression(expression)
         self._topics: tuple[Topic[Any], ...] = tuple(_topic(participant, wanted) for wanted in parsed.topics)
         structs = [topic.type_support.struct for topic in self._topics]
@@ -63,26 +57,6 @@ class MultiTopic(Entity, Generic[T]):
 
     def __repr__(self) -> str:
         return f"<MultiTopic {self._name!r}: {self.subscription_expression!r}>"
-
-    @property
-    def participant(self) -> DomainParticipant:
-        return self._participant
-
-    @property
-    def name(self) -> str:
-        return self._name
-
-    @property
-    def type(self) -> type[T]:
-        return self._type_support.python_class
-
-    @property
-    def type_name(self) -> str:
-        return self._type_support.type_name
-
-    @property
-    def type_support(self) -> TypeSupport[T]:
-        return self._type_support
 
     @property
     def topics(self) -> tuple[Topic[Any], ...]:
@@ -111,9 +85,6 @@ class MultiTopic(Entity, Generic[T]):
         for reader in self._readers:
             if not reader.is_closed:
                 reader._join_again()
-
-    def _on_close(self) -> None:
-        self._participant._disown(self)
 
 
 def _topic(participant: DomainParticipant, name: str) -> Topic[Any]:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
-from ..structure.errors import BadParameter
 from ..structure.qos import Qos
 from ..structure.qos_changes import check_changeable
 from ..structure.status import InconsistentTopic
-from ..xtypes.type_support import TypeSupport, type_support
+from ..xtypes.type_support import type_support
 from .endpoint import follow_all
-from .entity import Entity
+from .topic_description import TopicDescription
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
@@ -19,10 +18,9 @@ if TYPE_CHECKING:
 __all__ = ["Topic"]
 
 T = TypeVar("T")
-_MAX_NAME_OCTETS = 255
 
 
-class Topic(Entity, Generic[T]):
+class Topic(TopicDescription[T]):
     """What writers and readers agree on: the topic's name and the type of its samples.
 
     ``qos`` serves the topic's writers and readers wherever they do not set a policy themselves.  Closing a topic does
@@ -33,37 +31,10 @@ class Topic(Entity, Generic[T]):
 
     def __init__(self, participant: DomainParticipant, name: str, type_: type[T], qos: Qos | None = None) -> None:
         """``name``: 1 to 255 octets of UTF-8.  Raises BadParameter, also when ``type_`` cannot be a topic's type."""
-        super().__init__(qos)
-        if not isinstance(name, str) or not 1 <= len(name.encode()) <= _MAX_NAME_OCTETS or "\0" in name:
-            raise BadParameter(f"a topic's name is a str of 1 to 255 octets without NUL, not {name!r}")
-        participant._running_pump()
-        self._participant = participant
-        self._name = name
-        self._type = type_
-        self._type_support: TypeSupport[T] = type_support(type_)
+        super().__init__(participant, name, type_support(type_), qos)
         self._is_enabled = participant._enables_members
         self._inconsistent_count = 0
         participant._adopt(self)
-
-    @property
-    def participant(self) -> DomainParticipant:
-        return self._participant
-
-    @property
-    def name(self) -> str:
-        return self._name
-
-    @property
-    def type(self) -> type[T]:
-        return self._type
-
-    @property
-    def type_name(self) -> str:
-        return self._type_support.type_name
-
-    @property
-    def type_support(self) -> TypeSupport[T]:
-        return self._type_support
 
     @property
     def _factory(self) -> DomainParticipant:
@@ -80,9 +51,6 @@ class Topic(Entity, Generic[T]):
         """One of its writers or readers met a peer that uses the name with another type."""
         self._inconsistent_count += 1
         self._status_changed(replace(met, total_count=self._inconsistent_count, total_count_change=1))
-
-    def _on_close(self) -> None:
-        self._participant._disown(self)
 
     def __repr__(self) -> str:
         return f"<Topic {self._name!r} of {self.type_name}>"
