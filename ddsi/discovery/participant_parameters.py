@@ -111,7 +111,7 @@ def _read_endpoints(values: ParameterValues) -> BuiltinEndpoints:
     """The two sets in one; a participant that announces neither has what every one must have."""
     endpoints = values.read(_PID.BUILTIN_ENDPOINT_SET, Reader.u32, _DEFAULT_ENDPOINTS)
     extended = values.read(_PID.AVAILABLE_EXTENDED_BUILTIN_ENDPOINTS, Reader.u32, 0)
-    return BuiltinEndpoints(endpoints | extended << _EXTENDED_FROM)
+    return BuiltinEndpoints.received(endpoints | extended << _EXTENDED_FROM)
 
 
 def _read_duration(reader: Reader) -> float:

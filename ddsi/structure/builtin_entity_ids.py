@@ -7,6 +7,7 @@ DDS-Security 1.1 §7.3.7.1 and §7.4.5 (the secure ones), DDS-Security 1.2 §7.5
 from __future__ import annotations
 
 from enum import IntFlag
+from typing import Any, Self
 
 from .guid import EntityId
 
@@ -65,6 +66,9 @@ TYPE_LOOKUP_REQUEST_SECURE_WRITER, TYPE_LOOKUP_REQUEST_SECURE_READER = _id("ff03
 TYPE_LOOKUP_REPLY_SECURE_WRITER, TYPE_LOOKUP_REPLY_SECURE_READER = _id("ff0301c3"), _id("ff0301c4")
 
 
+_MOST_REMEMBERED = 1024
+
+
 class BuiltinEndpoints(IntFlag):
     """BuiltinEndpointSet_t: which builtin endpoints a participant announces (PID 0x0058).
 
@@ -101,3 +105,19 @@ class BuiltinEndpoints(IntFlag):
     TYPE_LOOKUP_REQUEST_SECURE_READER = 1 << 33
     TYPE_LOOKUP_REPLY_SECURE_WRITER = 1 << 34
     TYPE_LOOKUP_REPLY_SECURE_READER = 1 << 35
+
+    @classmethod
+    def received(cls, number: int) -> Self:
+        """The set of a number that came from the network.
+
+        An IntFlag remembers every combination it ever made, and strangers may announce any: so beyond a number of them
+        they are made without being remembered.
+        """
+        known: Any = cls._value2member_map_.get(number)
+        if known is None and len(cls._value2member_map_) < _MOST_REMEMBERED:
+            return cls(number)
+        if known is None:
+            known = int.__new__(cls, number)
+            known._value_, known._name_ = number, None
+        found: Self = known
+        return found
