@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Generator
 
 import pytest
@@ -16,6 +17,11 @@ LOOPBACK = '<DDSI><Domain><General><Interfaces><NetworkInterface name="lo"/></In
 # interface for itself.  Overwritten rather than defaulted, as a developer's own setting may name a real network.
 os.environ["DDSI_URI"] = LOOPBACK
 os.environ["CYCLONEDDS_URI"] = LOOPBACK.replace("DDSI>", "CycloneDDS>")
+
+# A shell ignores SIGINT for what it starts in the background, and its children inherit that: tests of Ctrl-C would wait
+# for ever.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples on every run, so that a failure can be repeated; no deadline, as machines differ in speed.
 settings.register_profile("ddsi", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
