@@ -39,6 +39,9 @@ class ShapeMainStatus(IntEnum):
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line ``words`` (default: the process's own) and return the exit status."""
+    if words is None:
+        # What the suite asks for at the end may come once more while the interpreter is being cleared up: it was done.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     if isinstance(sys.stdout, io.TextIOWrapper):  # whoever reads a pipe waits for each line
         sys.stdout.reconfigure(line_buffering=True, errors="replace")
     try:
@@ -61,8 +64,6 @@ def main(words: Sequence[str] | None = None) -> int:
 async def _play(options: ShapeMainOptions) -> int:
     """Until all rounds are played, or a signal asks for the end: then what is under way is finished and said."""
     end = trio.Event()
-    # What the suite asks for at the end may come once more while the interpreter is being cleared up: it has been done.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with trio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async with trio.open_nursery() as nursery:
             nursery.start_soon(_end_on_signal, signals, end)
