@@ -1,8 +1,8 @@
 """RefusalLog: what keeps our endpoints from matching, as lines of Python's ``logging``, when it happens.
 
-The logger is ``ddsi``.  Whoever has not set up logging hears nothing of it; ``match_refusals``, ``explain`` and the
-statuses tell the same.  A pair that is refused by its partition is nobody's mistake: that is told at the level INFO,
-all else at WARNING.
+The logger is ``ddsi.matching``.  Whoever has not set up logging hears nothing of it; ``match_refusals``, ``explain``
+and the statuses tell the same.  A pair that is refused by its partition is nobody's mistake: that is told at the level
+INFO, all else at WARNING.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ..trace.wording import printable
 
 __all__ = ["LOGGER_NAME", "RefusalLog"]
 
-LOGGER_NAME = "ddsi"
+LOGGER_NAME = "ddsi.matching"
 _log = logging.getLogger(LOGGER_NAME)
-_log.addHandler(logging.NullHandler())
+_log.addHandler(logging.NullHandler())  # at the logger above it, this would silence security too
 
 _MOST_LINES = 1000
 """For each participant: strangers may announce any number of endpoints that fit nothing."""

@@ -14,7 +14,8 @@ from .running import Note, Shape, eventually, in_trio
 
 
 def _lines(caplog: pytest.LogCaptureFixture, level: int) -> list[str]:
-    return [record.getMessage() for record in caplog.records if (record.name, record.levelno) == ("ddsi", level)]
+    of_matching = [record for record in caplog.records if record.name == "ddsi.matching"]
+    return [record.getMessage() for record in of_matching if record.levelno == level]
 
 
 @in_trio
@@ -63,7 +64,7 @@ async def test_what_cannot_be_asked_is_refused(domain: int) -> None:
 @in_trio
 async def test_a_mismatch_is_a_line_of_the_log_when_it_happens(domain: int, caplog: pytest.LogCaptureFixture) -> None:
     """With the policy, both values and the remedy; once for the pair, and a partition below the level of warnings."""
-    caplog.set_level(logging.INFO, "ddsi")
+    caplog.set_level(logging.INFO, "ddsi.matching")
     async with ddsi.DomainParticipant(domain) as here, ddsi.DomainParticipant(domain) as there:
         topic = ddsi.Topic(here, "Square", Shape)
         reader = ddsi.DataReader(here, topic, ddsi.Qos(durability=ddsi.TransientLocal()))
