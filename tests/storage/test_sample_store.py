@@ -7,6 +7,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -24,10 +25,11 @@ ALIVE, DISPOSED = ChangeKind.ALIVE, ChangeKind.NOT_ALIVE_DISPOSED
 
 
 @pytest.fixture
-def store() -> SampleStore:
+def store() -> Iterator[SampleStore]:
     found = SampleStore(":memory:")
     found.add_topic(TOPIC)
-    return found
+    yield found
+    found.close()
 
 
 def add(
