@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -11,15 +10,12 @@ import pytest
 
 from ddsi import idl
 
-from .framework import Namespace, Process, Scenario, Unavailable, async_test, namespace, scenario
-from .peers.catalogue import CYCLONE_C, OURS
+from .framework import Namespace, Process, Scenario, async_test, namespace, scenario
+from .peers.catalogue import CYCLONE_C, CYCLONE_PYTHON, OURS
 from .peers.options import Options
 from .peers.peer import ROOT, Peer, network_environment
 
-pytestmark = [
-    pytest.mark.peers,
-    pytest.mark.skipif(importlib.util.find_spec("cyclonedds") is None, reason="cyclonedds is not installed"),
-]
+pytestmark = pytest.mark.peers
 
 DOMAIN = 1
 DDSI = [sys.executable, "-m", "ddsi.cli"]
@@ -69,6 +65,7 @@ TRACKS = [
 
 async def tracks(stage: Scenario, host: Namespace, role: str) -> Process:
     """The program of the other vendor, ready."""
+    CYCLONE_PYTHON.locate()
     command = [sys.executable, "-m", "multiproc_tests.peers.programs.cyclonedds_tracks", role, str(DOMAIN)]
     environment = network_environment(host.interface)
     process = await stage.start(role, command, namespace=host, environment=environment, folder=ROOT)
@@ -199,10 +196,7 @@ async def test_every_vendor_that_tells_its_types_is_echoed(peer: Peer) -> None:
     with namespace() as host:
         async with scenario(f"echo {peer}", deadline=60) as stage:
             options = Options(domain=DOMAIN, count=2, wait_s=40)
-            try:
-                await peer.start(stage, "pub", options, host=host)
-            except Unavailable as error:
-                pytest.skip(str(error))
+            await peer.start(stage, "pub", options, host=host)
             echo = await ddsi(stage, host, "echo", "Square", "-n", "2")
             await echo.expect_exit(0, timeout=40)
     assert output(echo) == ['color: "BLUE", x: 0, y: 0, shapesize: 30', 'color: "BLUE", x: 1, y: 2, shapesize: 30']

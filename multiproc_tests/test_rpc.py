@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 
 import pytest
 
 from .framework import async_test, namespace, scenario
+from .peers.catalogue import CYCLONE_PYTHON
 from .peers.peer import ROOT, network_environment
 
-pytestmark = [
-    pytest.mark.peers,
-    pytest.mark.skipif(importlib.util.find_spec("cyclonedds") is None, reason="cyclonedds is not installed"),
-]
+pytestmark = pytest.mark.peers
 
 DOMAIN = 1
 ANSWERS = ["ANSWER REMOTE_EX_OK 23", "ANSWER REMOTE_EX_OK 24", "ANSWER REMOTE_EX_INVALID_ARGUMENT 0"]
@@ -23,6 +20,8 @@ ANSWERS = ["ANSWER REMOTE_EX_OK 23", "ANSWER REMOTE_EX_OK 24", "ANSWER REMOTE_EX
 @async_test
 async def test_calls_are_answered_or_refused(client: str, service: str) -> None:
     """The types match as each vendor compares them, so both know the same types by the same hashes."""
+    if "cyclonedds" in (client, service):
+        CYCLONE_PYTHON.locate()
     with namespace() as host:
         async with scenario("rpc", deadline=60) as stage:
             environment = network_environment(host.interface)

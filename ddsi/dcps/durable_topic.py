@@ -12,6 +12,7 @@ everything at least once.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -248,14 +249,12 @@ class DurableTopic:
 
     async def record(self) -> None:
         """Keep what is written, until it is closed."""
-        while True:
-            try:
+        with suppress(AlreadyDeleted):
+            while True:
                 await self._recorder.wait()
-            except AlreadyDeleted:
-                return
-            for sample in self._recorder.take(_PORTION):
-                self._keep(sample.data)
-            self.store.commit()
+                for sample in self._recorder.take(_PORTION):
+                    self._keep(sample.data)
+                self.store.commit()
 
     def _keep(self, change: CacheChange) -> None:
         key = change.key or change.key_hash

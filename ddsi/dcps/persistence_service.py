@@ -105,7 +105,9 @@ class PersistenceService:
                         with trio.move_on_after(_LOOK_PERIOD_S):
                             await self._participant.wait_for_discovery()
         except* AlreadyDeleted:
-            pass  # the participant was closed, and so is everything of ours
+            if not self._participant._is_closed:
+                raise
+            # The participant was closed, and so is everything of ours.
 
     async def _look(self) -> None:
         """Which durable writers are there?"""

@@ -187,6 +187,7 @@ class SampleReader(Entity, Generic[T]):
             self._drop_undecodable()
             self._check_open()
             await self._wait_for_news()
+        self._check_open()
         self._drop_undecodable()
 
     # --- inside ------------------------------------------------------------------------------------------
@@ -228,6 +229,8 @@ class SampleReader(Entity, Generic[T]):
         """Until something may have changed.  What this task has written must not wait meanwhile."""
         self._history.seen()
         self._pump.before_waiting()
+        if self._history.has_news:  # what was acted upon just now has written into it
+            return
         if self._pump.can_be_led:
             await self._pump.lead(self._history)
         else:

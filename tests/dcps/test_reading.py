@@ -263,6 +263,20 @@ async def test_wait_says_when_the_reader_is_closed(domain: int) -> None:
         p.reader.close()
 
 
+@in_trio
+async def test_wait_says_so_too_when_a_sample_came_just_before(domain: int) -> None:
+    async with pair(domain, local=True) as p, trio.open_nursery() as nursery:
+
+        async def wait() -> None:
+            with pytest.raises(ddsi.AlreadyDeleted):
+                await p.reader.wait()
+
+        nursery.start_soon(wait)
+        await trio.sleep(0.005)
+        await p.writer.write(Shape("RED"))
+        p.reader.close()
+
+
 # --- samples that do not decode --------------------------------------------------------------------------
 
 
