@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Unpack
 
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredReaderData
@@ -25,10 +26,9 @@ from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
 from .content_filter import ContentFilter
-from .dropping import WhenDropped, drop_silently
 from .filtered import directed_heartbeat_range, gap_before
 from .reader_proxy import ReaderProxy
-from .stateful_writer import StatefulWriter
+from .stateful_writer import StatefulWriter, WriterSettings
 from .transmissions import SendData, SendFragments, SendHeartbeat, SendHeartbeatFrag, WriterTransmission
 
 __all__ = ["ContentFilteringWriter"]
@@ -37,22 +37,8 @@ __all__ = ["ContentFilteringWriter"]
 class ContentFilteringWriter(StatefulWriter):
     """Other name: a writer that filters (writer-side filtering)."""
 
-    def __init__(
-        self,
-        guid: Guid,
-        qos: EndpointQos,
-        *,
-        fragment_octets: int,
-        unacknowledged_octets_max: int,
-        on_dropped: WhenDropped = drop_silently,
-    ) -> None:
-        super().__init__(
-            guid,
-            qos,
-            fragment_octets=fragment_octets,
-            unacknowledged_octets_max=unacknowledged_octets_max,
-            on_dropped=on_dropped,
-        )
+    def __init__(self, guid: Guid, qos: EndpointQos, **settings: Unpack[WriterSettings]) -> None:
+        super().__init__(guid, qos, **settings)
         # The readers of other participants whose filter this writer evaluates.
         self._filtering: dict[Guid, ReaderProxy] = {}
 

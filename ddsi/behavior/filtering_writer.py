@@ -14,15 +14,15 @@ told in :mod:`ddsi.behavior.filtered`; this is its writer's side.  It differs fr
 from __future__ import annotations
 
 from itertools import takewhile
+from typing import Unpack
 
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.coherence import Coherence
 from ..structure.guid import GUID_UNKNOWN, Guid
 from ..structure.qos import EndpointQos
-from .dropping import WhenDropped, drop_silently
 from .filtered import gap_before
 from .reader_proxy import ReaderProxy
-from .stateful_writer import StatefulWriter
+from .stateful_writer import StatefulWriter, WriterSettings
 from .transmissions import SendHeartbeat, WriterTransmission
 
 __all__ = ["MAX_CHANGES_PER_DESTINATION", "FilteringWriter"]
@@ -34,22 +34,8 @@ MAX_CHANGES_PER_DESTINATION = 256
 class FilteringWriter(StatefulWriter):
     """The history is KEEP_ALL, as a change for one reader must not push out another's."""
 
-    def __init__(
-        self,
-        guid: Guid,
-        qos: EndpointQos,
-        *,
-        fragment_octets: int,
-        unacknowledged_octets_max: int,
-        on_dropped: WhenDropped = drop_silently,
-    ) -> None:
-        super().__init__(
-            guid,
-            qos,
-            fragment_octets=fragment_octets,
-            unacknowledged_octets_max=unacknowledged_octets_max,
-            on_dropped=on_dropped,
-        )
+    def __init__(self, guid: Guid, qos: EndpointQos, **settings: Unpack[WriterSettings]) -> None:
+        super().__init__(guid, qos, **settings)
         # The numbers in the cache by destination, ascending.  A dict serves as an ordered set.
         self._held: dict[Guid, dict[int, None]] = {}
 

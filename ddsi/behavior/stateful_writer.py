@@ -15,6 +15,7 @@ import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NotRequired, TypedDict
 
 from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.coherence import Coherence
@@ -35,11 +36,19 @@ from .send_window import SendWindow
 from .transmissions import SendData, SendFragments, SendHeartbeat, SendHeartbeatFrag, WriterTransmission
 from .writer_history_cache import WriterHistoryCache
 
-__all__ = ["StatefulWriter"]
+__all__ = ["StatefulWriter", "WriterSettings"]
 
 _STALLED_AFTER_S = 0.5
 _PACE_S = 0.001
 _LEAST_REPAIR_OCTETS = 64 * 1024  # what one request for repair brings at least, however small the window is
+
+
+class WriterSettings(TypedDict):
+    """The keywords of a StatefulWriter, for those that are made with the same."""
+
+    fragment_octets: int
+    unacknowledged_octets_max: int
+    on_dropped: NotRequired[WhenDropped]
 
 
 class StatefulWriter:
