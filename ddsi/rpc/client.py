@@ -11,18 +11,14 @@ from ..dcps.entity import deadline_scope
 from ..structure.errors import AlreadyDeleted, DdsTimeout
 from ..structure.guid import Guid
 from ..structure.qos import Qos
-from ..structure.qos_policies import KeepAll, Reliable
 from .correlation import CorrelatedReader, CorrelatedSample, CorrelatedWriter, Identity
 from .identity import RemoteError
-from .mapping import Mapping, wire
+from .rpc_entity import RpcEntity
 
-__all__ = ["SERVICE_QOS", "Client"]
+__all__ = ["Client"]
 
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
-
-SERVICE_QOS = Qos(reliability=Reliable(max_blocking_time=1.0), history=KeepAll())
-"""Of the four endpoints of a service and its client, wherever nothing else is said."""
 
 
 class _Pending(Generic[Rep]):
@@ -35,45 +31,22 @@ class _Pending(Generic[Rep]):
         self.arrived = trio.Event()
 
 
-class Client(Generic[Req, Rep]):
+class Client(RpcEntity[Req, Rep]):
     """Calls a service by its name; any number of calls at once.  Closed with its participant, or by :meth:`close`.
 
     Replies to others, and those that come too late, are dropped as they arrive.
     """
 
-    def __init__(
-        self,
-        participant: DomainParticipant,
-        name: str,
-        request_type: type[Req],
-        reply_type: type[Rep],
-        *,
-        instance_name: str = "",
-        mapping: Mapping = Mapping.BASIC,
-        qos: Qos | None = None,
-        request_topic: str | None = None,
-        reply_topic: str | None = None,
-    ) -> None:
-        """``name`` gives the topics their names, ``name_Request`` and ``name_Reply``, unless others are given.
-
-        ``instance_name``: ask only the service that has it; empty for any.  ``qos`` goes before the default, which is
-        reliable and keeps all.  Raises BadParameter, InconsistentPolicy, NotAllowedBySecurity, AlreadyDeleted.
-        """
-        self._name = name
-        self._instance_name = instance_name
-        self._wire = wire(mapping, name, request_type, reply_type)
-        qos = SERVICE_QOS | (qos or Qos())
-        requests: Topic[Any] = Topic(participant, request_topic or f"{name}_Request", self._wire.request_type)
-        replies: Topic[Any] = Topic(participant, reply_topic or f"{name}_Reply", self._wire.reply_type)
+    def _open(self, participant: DomainParticipant, requests: Topic[Any], replies: Topic[Any], qos: Qos) -> None:
         self._pending: dict[Identity, _Pending[Rep]] = {}
+        self._call_count = 0
+        self._dropped_count = 0
         self._reader = CorrelatedReader(participant, replies, qos, self._replies_came, self._ended)
         try:
             self._writer = CorrelatedWriter(participant, requests, qos)
         except BaseException:
             self._reader.close()
             raise
-        self._call_count = 0
-        self._dropped_count = 0
 
     def __repr__(self) -> str:
         return f"<rpc.Client of {self._name!r}, {len(self._pending)} calls under way>"
@@ -132,11 +105,6 @@ class Client(Generic[Req, Rep]):
         if answer is None:
             raise AlreadyDeleted(f"{self!r} was closed while a call waited for its answer")
         return answer
-
-    def close(self) -> None:
-        """End it; calls that wait raise AlreadyDeleted.  Safe twice."""
-        for entity in (self._reader, self._writer, self._reader.topic, self._writer.topic):
-            entity.close()
 
     def _why_not(self, timeout: float | None, *, is_asked: bool) -> str:
         if not is_asked:

@@ -13,10 +13,9 @@ from ..structure.errors import BadParameter, DdsError, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import Qos
 from ..structure.sample_info import SampleInfo
-from .client import SERVICE_QOS
 from .correlation import CorrelatedReader, CorrelatedSample, CorrelatedWriter, Identity
 from .identity import RemoteError, RemoteExceptionCode
-from .mapping import Mapping, wire
+from .rpc_entity import RpcEntity
 
 __all__ = ["Request", "Service"]
 
@@ -68,29 +67,10 @@ class Request(Generic[Req, Rep]):
             raise
 
 
-class Service(Generic[Req, Rep]):
+class Service(RpcEntity[Req, Rep]):
     """``async for request in service``, or :meth:`serve`.  Closed with its participant, or by :meth:`close`."""
 
-    def __init__(
-        self,
-        participant: DomainParticipant,
-        name: str,
-        request_type: type[Req],
-        reply_type: type[Rep],
-        *,
-        instance_name: str = "",
-        mapping: Mapping = Mapping.BASIC,
-        qos: Qos | None = None,
-        request_topic: str | None = None,
-        reply_topic: str | None = None,
-    ) -> None:
-        """As :class:`ddsi.rpc.Client`.  ``instance_name``: answer only who asks for it, or for any."""
-        self._name = name
-        self._instance_name = instance_name
-        self._wire = wire(mapping, name, request_type, reply_type)
-        qos = SERVICE_QOS | (qos or Qos())
-        requests: Topic[Any] = Topic(participant, request_topic or f"{name}_Request", self._wire.request_type)
-        replies: Topic[Any] = Topic(participant, reply_topic or f"{name}_Reply", self._wire.reply_type)
+    def _open(self, participant: DomainParticipant, requests: Topic[Any], replies: Topic[Any], qos: Qos) -> None:
         # The writer first: whoever finds the reader and asks shall find the writer too.
         self._writer = CorrelatedWriter(participant, replies, qos)
         try:
@@ -140,11 +120,6 @@ class Service(Generic[Req, Rep]):
                 except StopAsyncIteration:
                     return
                 nursery.start_soon(handle, request)
-
-    def close(self) -> None:
-        """End it; requests that were taken can no longer be answered.  Safe twice."""
-        for entity in (self._reader, self._writer, self._reader.topic, self._writer.topic):
-            entity.close()
 
     async def _answer(self, sample: Any, request: Identity, asker: Guid) -> None:
         """``asker``: the writer of the request, whose participant has the reader that waits."""
