@@ -16,7 +16,15 @@ from ..config import Config
 from ..dcps.data_writer import Timestamp
 from ..dcps.type_access import AnnouncedEndpoint
 from ..portal.conditions import WaitSetPortal
-from ..portal.endpoints import InstanceSelection, ReaderPortal, SampleReaderPortal, Selection, WriterPortal
+from ..portal.endpoints import (
+    B,
+    BuiltinTopicReaderPortal,
+    InstanceSelection,
+    ReaderPortal,
+    SampleReaderPortal,
+    Selection,
+    WriterPortal,
+)
 from ..portal.entities import (
     EntityPortal,
     FilteredTopicPortal,
@@ -24,13 +32,8 @@ from ..portal.entities import (
     PublisherPortal,
     SubscriberPortal,
     TopicPortal,
-    check_parent,
 )
-from ..structure.builtin_topic_data import (
-    ParticipantBuiltinTopicData,
-    PublicationBuiltinTopicData,
-    SubscriptionBuiltinTopicData,
-)
+from ..portal.fetching import EventStreamPortal, Fetching
 from ..structure.errors import AlreadyDeleted, PreconditionNotMet
 from ..structure.qos import Qos
 from ..structure.status import Status
@@ -52,41 +55,27 @@ __all__ = [
 ]
 
 T = TypeVar("T")
-B = TypeVar("B", ParticipantBuiltinTopicData, PublicationBuiltinTopicData, SubscriptionBuiltinTopicData)
 
 
-class EventStream(AsyncIterator[Status]):
-    """``async for event in entity.events()``: the statuses of one entity as they change, until it is closed."""
-
-    def __init__(self, entity: EntityPortal) -> None:
-        self._engine = entity._running_engine()
-        self._stream: dcps.EventStream = self._engine.run_now(entity._entity.events)
-        self._next: list[Status] = []
-
-    @property
-    def dropped(self) -> int:
-        """How many were forgotten because more than 1024 waited unread."""
-        return self._stream.dropped
+class _Iterated(Fetching[T], AsyncIterator[T]):
+    """``async for``: one after the other, waiting for more until there can be none."""
 
     def __aiter__(self) -> Self:
         return self
 
-    async def __anext__(self) -> Status:
-        if not self._next:
+    async def __anext__(self) -> T:
+        while not self._fetched:  # once more, where another task took what this one has fetched
+            if self._is_at_end():
+                raise StopAsyncIteration
             try:
                 await self._engine.run_for_asyncio(self._fetch)
             except AlreadyDeleted:  # the participant has gone altogether
                 raise StopAsyncIteration from None
-        if not self._next:
-            raise StopAsyncIteration
-        return self._next.pop()
+        return self._fetched.popleft()
 
-    async def _fetch(self) -> None:
-        # Put aside rather than returned: an event must not be lost when the task that asked is cancelled meanwhile.
-        try:
-            self._next.append(await self._stream.__anext__())
-        except StopAsyncIteration:
-            return
+
+class EventStream(_Iterated[Status], EventStreamPortal):
+    """``async for event in entity.events()``: the statuses of one entity as they change, until it is closed."""
 
 
 class _Async(EntityPortal):
@@ -216,24 +205,8 @@ class DataWriter(_Async, WriterPortal[T], Generic[T]):
         await self._engine.run_for_asyncio(self._inner.wait_for_matched, count, timeout)
 
 
-class _Reading(_Async, SampleReaderPortal[T], Generic[T]):
+class _Reading(_Async, _Iterated[dcps.Sample[T]], SampleReaderPortal[T], Generic[T]):
     """``async for sample in reader`` takes one after the other, and waits for more until the reader is closed."""
-
-    def __aiter__(self) -> Self:
-        return self
-
-    async def __anext__(self) -> dcps.Sample[T]:
-        if not self._fetched:
-            if self._entity.is_closed:
-                raise StopAsyncIteration
-            try:
-                await self._engine.run_for_asyncio(self._fetch)
-            except AlreadyDeleted:  # the participant has gone altogether
-                raise StopAsyncIteration from None
-        try:
-            return self._fetched.popleft()
-        except IndexError:
-            raise StopAsyncIteration from None
 
     async def take(self, max_samples: int | None = None, **selection: Unpack[Selection]) -> list[dcps.Sample[T]]:
         """Samples that are here now, oldest first, removed from the reader; waits for none to come."""
@@ -286,15 +259,12 @@ class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
         await self._engine.run_for_asyncio(self._inner.wait_for_historical_data, timeout)
 
 
-class BuiltinTopicReader(_Reading[B], Generic[B]):
-    """Reads of remote participants, writers or readers: see ``ddsi.BuiltinTopicReader``."""
+class BuiltinTopicReader(_Reading[B], BuiltinTopicReaderPortal[B], Generic[B]):
+    """Reads of remote participants, topics, writers or readers: see ``ddsi.BuiltinTopicReader``."""
 
     def __init__(self, participant: DomainParticipant, kind: type[B]) -> None:
-        """``kind``: ParticipantBuiltinTopicData, PublicationBuiltinTopicData or SubscriptionBuiltinTopicData."""
-        check_parent(participant, DomainParticipant)
-        self._participant = participant
-        inner = participant._ask(partial(dcps.BuiltinTopicReader, participant._inner, kind))
-        super().__init__(participant._engine, inner)
+        """``kind``: ParticipantBuiltinTopicData, or Topic..., Publication... or SubscriptionBuiltinTopicData."""
+        BuiltinTopicReaderPortal.__init__(self, participant, kind)
 
 
 class WaitSet(WaitSetPortal):

@@ -7,6 +7,7 @@ errors are those of ``ddsi``; what differs is said here.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, Unpack
@@ -17,7 +18,15 @@ from ..dcps.data_writer import Timestamp
 from ..dcps.entity import deadline_scope
 from ..dcps.type_access import AnnouncedEndpoint
 from ..portal.conditions import WaitSetPortal
-from ..portal.endpoints import InstanceSelection, ReaderPortal, SampleReaderPortal, Selection, WriterPortal
+from ..portal.endpoints import (
+    B,
+    BuiltinTopicReaderPortal,
+    InstanceSelection,
+    ReaderPortal,
+    SampleReaderPortal,
+    Selection,
+    WriterPortal,
+)
 from ..portal.entities import (
     EntityPortal,
     FilteredTopicPortal,
@@ -25,13 +34,8 @@ from ..portal.entities import (
     PublisherPortal,
     SubscriberPortal,
     TopicPortal,
-    check_parent,
 )
-from ..structure.builtin_topic_data import (
-    ParticipantBuiltinTopicData,
-    PublicationBuiltinTopicData,
-    SubscriptionBuiltinTopicData,
-)
+from ..portal.fetching import EventStreamPortal, Fetching
 from ..structure.errors import AlreadyDeleted, DdsTimeout
 from ..structure.qos import Qos
 from ..structure.status import Status
@@ -54,38 +58,28 @@ __all__ = [
 ]
 
 T = TypeVar("T")
-B = TypeVar("B", ParticipantBuiltinTopicData, PublicationBuiltinTopicData, SubscriptionBuiltinTopicData)
 
 
-class EventStream(Iterator[Status]):
-    """``for event in entity.events()``: the statuses of one entity as they change, until it is closed."""
-
-    def __init__(self, entity: EntityPortal) -> None:
-        self._engine = entity._running_engine()
-        self._stream: dcps.EventStream = self._engine.run_now(entity._entity.events)
-
-    @property
-    def dropped(self) -> int:
-        """How many were forgotten because more than 1024 waited unread."""
-        return self._stream.dropped
+class _Iterated(Fetching[T], Iterator[T]):
+    """``for``: one after the other, waiting for more until there can be none."""
 
     def __iter__(self) -> Self:
         return self
 
-    def __next__(self) -> Status:
-        try:
-            event = self._engine.run(self._next)
-        except AlreadyDeleted:  # the participant has gone altogether
-            event = None
-        if event is None:
-            raise StopIteration
-        return event
+    def __next__(self) -> T:
+        while True:
+            with suppress(IndexError):  # there is none, or another thread has just taken what this one fetched
+                return self._fetched.popleft()
+            if self._is_at_end():
+                raise StopIteration
+            try:
+                self._engine.run(self._fetch)
+            except AlreadyDeleted:  # the participant has gone altogether
+                raise StopIteration from None
 
-    async def _next(self) -> Status | None:
-        try:
-            return await self._stream.__anext__()
-        except StopAsyncIteration:
-            return None
+
+class EventStream(_Iterated[Status], EventStreamPortal):
+    """``for event in entity.events()``: the statuses of one entity as they change, until it is closed."""
 
 
 class _Blocking(EntityPortal):
@@ -239,24 +233,8 @@ class DataWriter(_Blocking, WriterPortal[T], Generic[T]):
         self._engine.run(self._inner.wait_for_matched, count, timeout)
 
 
-class _Reading(_Blocking, SampleReaderPortal[T], Generic[T]):
+class _Reading(_Blocking, _Iterated[dcps.Sample[T]], SampleReaderPortal[T], Generic[T]):
     """``for sample in reader`` takes one after the other, and waits for more until the reader is closed."""
-
-    def __iter__(self) -> Self:
-        return self
-
-    def __next__(self) -> dcps.Sample[T]:
-        if not self._fetched:
-            if self._entity.is_closed:
-                raise StopIteration
-            try:
-                self._engine.run(self._fetch)
-            except AlreadyDeleted:  # the participant has gone altogether
-                raise StopIteration from None
-        try:
-            return self._fetched.popleft()
-        except IndexError:
-            raise StopIteration from None
 
     def take(self, max_samples: int | None = None, **selection: Unpack[Selection]) -> list[dcps.Sample[T]]:
         """Samples that are here now, oldest first, removed from the reader; never waits for one."""
@@ -311,15 +289,12 @@ class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
         self._engine.run(self._inner.wait_for_historical_data, timeout)
 
 
-class BuiltinTopicReader(_Reading[B], Generic[B]):
-    """Reads of remote participants, writers or readers: see ``ddsi.BuiltinTopicReader``."""
+class BuiltinTopicReader(_Reading[B], BuiltinTopicReaderPortal[B], Generic[B]):
+    """Reads of remote participants, topics, writers or readers: see ``ddsi.BuiltinTopicReader``."""
 
     def __init__(self, participant: DomainParticipant, kind: type[B], *, listener: Listener | None = None) -> None:
-        """``kind``: ParticipantBuiltinTopicData, PublicationBuiltinTopicData or SubscriptionBuiltinTopicData."""
-        check_parent(participant, DomainParticipant)
-        self._participant = participant
-        inner = participant._ask(partial(dcps.BuiltinTopicReader, participant._inner, kind))
-        super().__init__(participant._engine, inner)
+        """``kind``: ParticipantBuiltinTopicData, or Topic..., Publication... or SubscriptionBuiltinTopicData."""
+        BuiltinTopicReaderPortal.__init__(self, participant, kind)
         self.set_listener(listener)
 
 

@@ -11,7 +11,12 @@ from functools import partial
 from typing import Any, Generic, TypedDict, TypeVar
 
 from .. import dcps
-from ..structure.builtin_topic_data import PublicationBuiltinTopicData, SubscriptionBuiltinTopicData
+from ..structure.builtin_topic_data import (
+    ParticipantBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
+    TopicBuiltinTopicData,
+)
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos
 from .call import Lane
@@ -25,10 +30,25 @@ from .entities import (
     TopicPortal,
     check_parent,
 )
+from .fetching import Fetching
 
-__all__ = ["InstanceSelection", "ReaderPortal", "SampleReaderPortal", "Selection", "WriterPortal"]
+__all__ = [
+    "BuiltinTopicReaderPortal",
+    "InstanceSelection",
+    "ReaderPortal",
+    "SampleReaderPortal",
+    "Selection",
+    "WriterPortal",
+]
 
 T = TypeVar("T")
+B = TypeVar(
+    "B",
+    ParticipantBuiltinTopicData,
+    TopicBuiltinTopicData,
+    PublicationBuiltinTopicData,
+    SubscriptionBuiltinTopicData,
+)
 _FETCHED_AT_ONCE = 64
 
 
@@ -118,7 +138,7 @@ class WriterPortal(EntityPortal, Generic[T]):
             await self._inner.write(sample)
 
 
-class SampleReaderPortal(EntityPortal, Generic[T]):
+class SampleReaderPortal(Fetching[dcps.Sample[T]], EntityPortal, Generic[T]):
     """What readers of topics and of builtin topics share.
 
     Iteration fetches what is there, at most 64 samples at once, as crossing threads costs more than a sample does.
@@ -134,8 +154,10 @@ class SampleReaderPortal(EntityPortal, Generic[T]):
     def guid(self) -> Guid:
         return self._source.guid
 
+    def _is_at_end(self) -> bool:
+        return self._entity.is_closed
+
     async def _fetch(self) -> None:
-        """In the engine's thread: wait for samples.  Leaves without any when the reader is closed."""
         try:
             self._fetched.append(await self._source.__anext__())
         except StopAsyncIteration:
@@ -168,6 +190,17 @@ class SampleReaderPortal(EntityPortal, Generic[T]):
     def close(self) -> None:
         super().close()
         self._fetched.clear()
+
+
+class BuiltinTopicReaderPortal(SampleReaderPortal[B]):
+    """A reader of a builtin topic."""
+
+    def __init__(self, participant: ParticipantPortal, kind: type[B]) -> None:
+        """As ``ddsi.BuiltinTopicReader``; ``participant`` is one of this module's."""
+        check_parent(participant, ParticipantPortal)
+        self._participant = participant
+        create = partial(dcps.BuiltinTopicReader, participant._inner, kind)
+        super().__init__(participant._engine, participant._ask(create))
 
 
 class ReaderPortal(SampleReaderPortal[T]):

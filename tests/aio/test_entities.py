@@ -115,6 +115,29 @@ async def _living_calls() -> int:
 
 
 @in_asyncio
+async def test_tasks_that_iterate_over_one_reader_share_its_samples_until_it_is_closed(domain: int) -> None:
+    """None of them ends because another took what it had fetched."""
+    async with aio.DomainParticipant(domain) as participant:
+        pair = Pair(participant)
+        seen: list[int] = []
+
+        async def iterate() -> None:
+            async for sample in pair.reader:
+                seen.append(sample.data.x)
+
+        tasks = [asyncio.create_task(iterate()) for _ in range(4)]
+        for number in range(100):
+            await pair.writer.write(Shape("BLUE", number))
+            await asyncio.sleep(0)
+        while len(seen) < 100:
+            await asyncio.sleep(0.005)
+        assert not any(task.done() for task in tasks)
+        pair.reader.close()
+        await asyncio.gather(*tasks)
+        assert sorted(seen) == list(range(100))
+
+
+@in_asyncio
 async def test_a_write_that_is_cancelled_while_it_waits_for_room_is_not_done(domain: int) -> None:
     qos = ddsi.Qos(
         reliability=ddsi.Reliable(max_blocking_time=20),

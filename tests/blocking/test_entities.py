@@ -80,6 +80,31 @@ def test_what_iteration_fetched_ahead_is_handed_out_by_take_and_ends_a_wait(doma
         assert pair.reader.take() == []
 
 
+def test_threads_that_iterate_over_one_reader_share_its_samples_until_it_is_closed(domain: int) -> None:
+    """None of them ends because another took what it had fetched."""
+    with blocking.DomainParticipant(domain) as participant:
+        pair = Pair(participant)
+        seen: list[int] = []
+        have_all = threading.Event()
+
+        def iterate() -> None:
+            for sample in pair.reader:
+                seen.append(sample.data.x)
+                if len(seen) == 200:
+                    have_all.set()
+
+        threads = [_in_thread(iterate) for _ in range(4)]
+        for number in range(200):
+            pair.writer.write(Shape("BLUE", number))
+        assert have_all.wait(10)
+        assert all(thread.is_alive() for thread in threads)
+        pair.reader.close()
+        for thread in threads:
+            thread.join(10)
+        assert not any(thread.is_alive() for thread in threads)
+        assert sorted(seen) == list(range(200))
+
+
 def test_reading_by_states_conditions_and_instances(domain: int) -> None:
     with blocking.DomainParticipant(domain) as participant:
         pair = Pair(participant)
