@@ -83,7 +83,7 @@ class ReaderHistoryCache:
         self._clock_offset = clock_offset
         self._on_news = on_news
         self._on_rejected = on_rejected
-        self._has_news = False
+        self._has_news = self._is_available = False
         self.arrivals: Iterator[int] | None = None  # numbers the samples of several readers as they come
         self.is_withholding = False  # did a reliable writer's sample find no room?
         self.content_filter: ContentFilter | None = None  # what does not pass has been received, and is not kept
@@ -167,7 +167,7 @@ class ReaderHistoryCache:
             if gate.expiring > 2 * len(self) + _COMPACT_ABOVE:
                 gate.forget_all_but(info for info in self._order if info._change is not None)
         if not self._has_news:
-            self._has_news = True
+            self._has_news = self._is_available = True
             self._on_news()
         return True
 
@@ -246,7 +246,7 @@ class ReaderHistoryCache:
             self._order.append(info)
             self._octets += len(change.payload)
         if not self._has_news:
-            self._has_news = True
+            self._has_news = self._is_available = True
             self._on_news()
 
     def _revive(self, instance: Instance) -> None:
@@ -390,9 +390,18 @@ class ReaderHistoryCache:
         """Has anything come since :meth:`seen`?"""
         return self._has_news
 
+    @property
+    def is_available(self) -> bool:
+        """Has anything come since :meth:`accessed`?  DDS 1.4 §2.2.4.2.2 (the status DATA_AVAILABLE)."""
+        return self._is_available
+
     def seen(self) -> None:
-        """The application is about to look: the next sample is news again."""
+        """Somebody is about to wait: the next sample is news again.  To others what is here may still be news."""
         self._has_news = False
+
+    def accessed(self) -> None:
+        """The application reads or takes: the next sample is news again, and makes data available."""
+        self._has_news = self._is_available = False
 
     def take_next(self) -> tuple[SampleInfo, CacheChange] | None:
         """The oldest sample, removed: the short form of :meth:`take` for ``async for``."""
@@ -410,6 +419,7 @@ class ReaderHistoryCache:
             instance.view_state = _NOT_NEW
             info.instance_state = instance.state
             info.sample_rank = 0  # it may have been read among others before
+            self._has_news = self._is_available = False
             if instance.generation:
                 self._set_generation_ranks([(info, instance)])
             self._purge(instance)

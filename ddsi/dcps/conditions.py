@@ -208,7 +208,10 @@ class QueryCondition(ReadCondition):
         return self._parameters
 
     def set_query_parameters(self, parameters: Sequence[str]) -> None:
-        """From now on these are the values of %0, %1 and so on.  Raises BadParameter, and then nothing has changed."""
+        """From now on these are the values of %0, %1 and so on, for who waits already too.
+
+        Raises BadParameter, and then nothing has changed.
+        """
         from ..xtypes.sql import checked_parameters
 
         checked = checked_parameters(parameters)
@@ -224,6 +227,7 @@ class QueryCondition(ReadCondition):
                 expression_parameters=checked,
             )
             self._remembering = ContentFilter(asked, self._filters.of_sample(self._holds))
+        self._its_reader()._reconsider()
 
     def _selector(self, reader: SampleReader[Any]) -> SampleSelector | None:
         super()._selector(reader)

@@ -116,6 +116,11 @@ class DataReader(SampleReader[T], Endpoint):
         self._history: ReaderHistoryCache = history
         self._participant._register(self._reader.guid, self)
 
+    def _create_anew(self, plan: QosPlan) -> None:
+        before = self._history
+        super()._create_anew(plan)
+        self._pump.woken(before, self._news)  # who waits for samples waits for those of the new one
+
     def _delete(self, local: LocalWriter | LocalReader) -> None:
         assert isinstance(local, LocalReader)
         self._participant._deregister(local.guid)
@@ -175,10 +180,11 @@ class DataReader(SampleReader[T], Endpoint):
         await trio.lowlevel.checkpoint()
         with scope:
             # Looked at now and then: a HEARTBEAT that says "there was nothing" is no news for anybody else.
-            while not all(proxy.has_historical_data for proxy in self._reader.behavior.writers.values()):
-                await trio.sleep(_LOOK_FOR_HISTORY_S)
+            while True:
                 self._check_open()
-            return
+                if all(proxy.has_historical_data for proxy in self._reader.behavior.writers.values()):
+                    return
+                await trio.sleep(_LOOK_FOR_HISTORY_S)
         raise DdsTimeout(f"reader of {self._topic.name!r} still lacks historical data after {timeout} s")
 
     def matched_publications(self) -> list[Guid]:

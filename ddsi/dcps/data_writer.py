@@ -95,6 +95,8 @@ class DataWriter(Endpoint, Generic[T]):
             types=support.type_description if self._pump.engine.config.announce_types else None,
             group=parent._group if isinstance(parent, Publisher) else None,
         )
+        if isinstance(parent, Publisher) and parent._is_suspended:
+            self._pump.engine.presentation.suspend(self._writer)
         self._representation = representation
         self._serialize = support.serializer(representation)
         self._serialize_key = support.key_serializer(representation)
@@ -301,6 +303,7 @@ class DataWriter(Endpoint, Generic[T]):
         """
         self._check_open()
         await trio.lowlevel.checkpoint()
+        self._check_open()
         behavior = self._writer.behavior
         last_sn = behavior.cache.last_sn
         with deadline_scope(timeout):

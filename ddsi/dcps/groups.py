@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
 import trio
 
 from ..engine import LocalWriter
-from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
+from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.qos import Qos
 from ..structure.qos_changes import check_changeable
 from ..structure.qos_policies import AccessScope
-from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE
+from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleState
 from ..structure.status import DataAvailable, DataOnReaders
 from .conditions import ReadCondition
 from .endpoint import Endpoint, follow_all
@@ -36,6 +36,8 @@ __all__ = ["Publisher", "Subscriber", "check_family"]
 S = TypeVar("S")
 
 _ON_READERS = DataOnReaders(is_available=True)
+_ANY = ReadCondition()
+_UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
 
 
 class _Group(Parent):
@@ -160,7 +162,10 @@ class Publisher(_Group):
         self._check_open()
         with deadline_scope(timeout):
             for writer in [member for member in self._members if isinstance(member, Endpoint)]:
-                await cast("DataWriter[Any]", writer).wait_for_acknowledgments()
+                try:
+                    await cast("DataWriter[Any]", writer).wait_for_acknowledgments()
+                except AlreadyDeleted:
+                    self._check_open()  # a writer that has been closed is not waited for
             return
         raise DdsTimeout(f"{self!r}: not all of its readers have acknowledged all after {timeout} s")
 
@@ -172,11 +177,6 @@ class Publisher(_Group):
     def _writers(self) -> list[LocalWriter]:
         endpoints = [member._local() for member in self._members if isinstance(member, Endpoint)]
         return [endpoint for endpoint in endpoints if isinstance(endpoint, LocalWriter)]
-
-    def _adopt(self, entity: Entity) -> None:
-        super()._adopt(entity)
-        if self._is_suspended:
-            self.suspend_publications()
 
 
 class Subscriber(_Group):
@@ -206,6 +206,7 @@ class Subscriber(_Group):
 
     def _has_news(self) -> None:
         self._news.unpark_all()
+        self._changed.unpark_all()
         for stream in self._streams:
             stream.put(_ON_READERS)
 
@@ -259,7 +260,7 @@ class Subscriber(_Group):
         self._check_open()
         found: list[tuple[int, DataReader[Any]]] = []
         for reader in self._readers():
-            is_ordered = self._limit_of(reader, None) == 1
+            is_ordered = isinstance(reader, Endpoint) and self._limit_of(reader, None) == 1
             states, selector = reader._selection(condition, sample_states, view_states, instance_states)
             infos = reader._history.matching(selector=selector, **states)
             found.extend((info.arrival, reader) for info in (infos if is_ordered else infos[:1]))
@@ -272,25 +273,29 @@ class Subscriber(_Group):
         """
         self._check_open()
         for reader in self._readers():
-            if len(reader._history):
+            if reader._matches(_ANY):
                 reader._has_news()
 
     async def wait(self) -> None:
         """Until one of the readers has a sample that has not been read.  Raises AlreadyDeleted, also meanwhile."""
         self._check_open()
         await self._pump.checkpoint(self._pump.now())
-        while not any(reader._has_unread() for reader in self._readers()):
+        while True:
+            self._check_open()
             for reader in self._readers():
                 reader._history.seen()
             self._pump.before_waiting()
+            if any(reader._matches(_UNREAD) for reader in self._readers()):
+                return
             await self._news.park()
             self._pump.has_yielded()
-            self._check_open()
 
     # --- inside ------------------------------------------------------------------------------------------
 
     def _readers(self) -> list[DataReader[Any]]:
-        return [cast("DataReader[Any]", member) for member in self._members if isinstance(member, SampleReader)]
+        """A MultiTopicReader is one, in the place of those that it takes from."""
+        members = (member for member in self._members if isinstance(member, SampleReader) and not member._is_part)
+        return [cast("DataReader[Any]", member) for member in members]
 
     def _limit_of(self, reader: DataReader[Any], max_samples: int | None) -> int | None:
         """How many samples may be taken from it at once, of ``max_samples`` that are wanted.

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MultiTopicReader"]
 
+S = TypeVar("S")
 T = TypeVar("T")
 
 
@@ -44,6 +45,7 @@ class _JoinedChange(CacheChange):
 class _Part(DataReader[Any]):
     """The reader of one topic; its news are those of the joined reader."""
 
+    _is_part = True
     whole: MultiTopicReader[Any] | None = None
 
     def _has_news(self) -> None:
@@ -115,6 +117,14 @@ class MultiTopicReader(SampleReader[T]):
         """Until each of its readers has matched so many writers.  Raises DdsTimeout."""
         for part in self._parts:
             await part.wait_for_matched(count, timeout)
+
+    def status(self, kind: type[S]) -> S:
+        self._absorb()
+        return super().status(kind)
+
+    def status_changes(self) -> frozenset[type]:
+        self._absorb()
+        return super().status_changes()
 
     # --- inside ------------------------------------------------------------------------------------------
 

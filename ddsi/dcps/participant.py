@@ -411,10 +411,11 @@ class DomainParticipant(Parent):
         self._running_pump().before_waiting()
         await trio.lowlevel.checkpoint()
         with scope:
-            while not holds():
+            while True:
+                entity._check_open()  # whenever others had their turn: nobody wakes who begins to wait afterwards
+                if holds():
+                    return
                 await entity._changed.park()
-                entity._check_open()
-            return
         raise DdsTimeout(f"{otherwise} after {timeout} s; `ddsi ls` shows who is there")
 
 

@@ -18,7 +18,7 @@ from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VI
 from ..structure.status import DataAvailable
 from ..transport import Pump
 from .conditions import ReadCondition
-from .entity import Entity
+from .entity import Entity, EventStream
 from .sample import Sample
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class SampleReader(Entity, Generic[T]):
     STATUSES: ClassVar[tuple[type, ...]] = (DataAvailable,)
 
     _history: ReaderHistoryCache
+    _is_part: ClassVar[bool] = False  # of a MultiTopicReader, which takes from it
 
     def __init__(self, participant: DomainParticipant, qos: Qos | None) -> None:
         super().__init__(qos)
@@ -48,12 +49,19 @@ class SampleReader(Entity, Generic[T]):
 
     def status(self, kind: type[S]) -> S:
         if kind is DataAvailable:
-            return cast(S, DataAvailable(is_available=self._history.has_news))
+            return cast(S, DataAvailable(is_available=self._history.is_available))
         return super().status(kind)
 
     def status_changes(self) -> frozenset[type]:
         changes = super().status_changes()
-        return changes | {DataAvailable} if self._history.has_news else changes
+        return changes | {DataAvailable} if self._history.is_available else changes
+
+    def events(self) -> EventStream:
+        """As of any entity; where samples are here that nobody has looked at, it begins by telling of them."""
+        stream = super().events()
+        if self._history.has_news:
+            stream.put(_AVAILABLE)
+        return stream
 
     # --- reading -----------------------------------------------------------------------------------------
 
@@ -99,7 +107,7 @@ class SampleReader(Entity, Generic[T]):
         """
         max_samples = self._begin_reading(max_samples)
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
-        self._history.seen()
+        self._history.accessed()
         sort_key = condition._sort_key if condition is not None else None
         if sort_key is not None and max_samples is not None:
             selector = self._first_of_order(sort_key, max_samples, states, instance, selector)
@@ -107,6 +115,8 @@ class SampleReader(Entity, Generic[T]):
         samples = [sample for info, change in taken if (sample := self._sample(info, change)) is not None]
         self._drop_undecodable()
         self._after_taking()
+        if taken:
+            self._reconsider()
         return samples if sort_key is None else _in_order(samples, sort_key)
 
     def read(
@@ -122,13 +132,15 @@ class SampleReader(Entity, Generic[T]):
         """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
         max_samples = self._begin_reading(max_samples)
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
-        self._history.seen()
+        self._history.accessed()
         sort_key = condition._sort_key if condition is not None else None
         if sort_key is not None and max_samples is not None:
             selector = self._first_of_order(sort_key, max_samples, states, instance, selector)
         found = self._history.read(max_samples, **states, instance=instance, selector=selector)
         samples = [sample for info, change in found if (sample := self._sample(info, change)) is not None]
         self._drop_undecodable()
+        if found:
+            self._reconsider()
         return samples if sort_key is None else _in_order(samples, sort_key)
 
     def take_next_instance(
@@ -182,8 +194,7 @@ class SampleReader(Entity, Generic[T]):
         """
         self._check_enabled()
         await self._pump.checkpoint(self._pump.now())
-        states, selector = self._selection(condition or _UNREAD, ANY_SAMPLE_STATE, ANY_VIEW_STATE, ANY_INSTANCE_STATE)
-        while not self._history.matches(selector=selector, **states):
+        while not self._matches(condition or _UNREAD):
             self._drop_undecodable()
             self._check_open()
             await self._wait_for_news()
@@ -196,11 +207,6 @@ class SampleReader(Entity, Generic[T]):
         """May the application look now, and at how many samples at most?"""
         self._check_enabled()
         return max_samples
-
-    def _has_unread(self) -> bool:
-        return self._history.matches(
-            sample_states=SampleState.NOT_READ, view_states=ANY_VIEW_STATE, instance_states=ANY_INSTANCE_STATE
-        )
 
     def _check_iterable(self) -> None:
         """May samples be taken one after the other as they come?"""
@@ -243,6 +249,12 @@ class SampleReader(Entity, Generic[T]):
             self._changed.unpark_all()
         for stream in self._streams:
             stream.put(_AVAILABLE)
+
+    def _reconsider(self) -> None:
+        """Samples are in other states now, or somebody waits for others: whoever waits looks again."""
+        self._pump.woken(self._history, self._news)
+        if self._changed:
+            self._changed.unpark_all()
 
     def _selection(
         self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int
