@@ -276,7 +276,10 @@ async def test_who_iterates_a_reader_that_is_not_enabled_gets_what_comes_when_it
 @in_trio
 async def test_a_reader_of_joined_topics_has_statuses_and_belongs_to_its_subscriber(domain: int) -> None:
     async with ddsi.DomainParticipant(domain) as participant:
-        topics = [ddsi.Topic(participant, "Where", Where), ddsi.Topic(participant, "Who", Who)]
+        topics: list[ddsi.Topic[Any]] = [
+            ddsi.Topic(participant, "Where", Where),
+            ddsi.Topic(participant, "Who", Who),
+        ]
         writers = [ddsi.DataWriter(participant, topic, RELIABLE) for topic in topics]
         joined = ddsi.MultiTopic(participant, "Both", Both, "SELECT * FROM Where NATURAL JOIN Who")
         subscriber = ddsi.Subscriber(participant)
@@ -291,6 +294,7 @@ async def test_a_reader_of_joined_topics_has_statuses_and_belongs_to_its_subscri
             assert nursery.child_tasks, "half a row is none"
             assert not condition.trigger_value
             await writers[1].write(Who("x", 2))
-        assert subscriber.get_datareaders() == [reader]
+        found: list[Any] = subscriber.get_datareaders()
+        assert found == [reader]
         assert [sample.data for sample in reader.take()] == [Both("x", 1, 2)]
         assert (condition.trigger_value, subscriber.get_datareaders()) == (False, [])
