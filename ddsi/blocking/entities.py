@@ -22,20 +22,15 @@ from ..portal.endpoints import (
     B,
     BuiltinTopicReaderPortal,
     InstanceSelection,
+    MultiTopicReaderPortal,
     ReaderPortal,
     SampleReaderPortal,
     Selection,
     WriterPortal,
 )
-from ..portal.entities import (
-    EntityPortal,
-    FilteredTopicPortal,
-    ParticipantPortal,
-    PublisherPortal,
-    SubscriberPortal,
-    TopicPortal,
-)
+from ..portal.entities import EntityPortal, ParticipantPortal, PublisherPortal, SubscriberPortal
 from ..portal.fetching import EventStreamPortal, Fetching
+from ..portal.topics import FilteredTopicPortal, MultiTopicPortal, TopicPortal
 from ..structure.errors import AlreadyDeleted, DdsTimeout
 from ..structure.qos import Qos
 from ..structure.status import Status
@@ -51,6 +46,8 @@ __all__ = [
     "DataWriter",
     "DomainParticipant",
     "EventStream",
+    "MultiTopic",
+    "MultiTopicReader",
     "Publisher",
     "Subscriber",
     "Topic",
@@ -167,6 +164,10 @@ class Topic(_Blocking, TopicPortal[T], Generic[T]):
 
 class ContentFilteredTopic(_Blocking, FilteredTopicPortal[T], Generic[T]):
     """Given to a DataReader in a Topic's place, lets it see only what passes: see ``ddsi.ContentFilteredTopic``."""
+
+
+class MultiTopic(_Blocking, MultiTopicPortal[T], Generic[T]):
+    """Several topics joined, selected from and filtered, for a MultiTopicReader: see ``ddsi.MultiTopic``."""
 
 
 class Publisher(_Blocking, PublisherPortal):
@@ -287,6 +288,26 @@ class DataReader(_Reading[T], ReaderPortal[T], Generic[T]):
     def wait_for_historical_data(self, timeout: float | None = None) -> None:
         """Until all that the matched transient-local writers held at the match has come.  Raises DdsTimeout."""
         self._engine.run(self._inner.wait_for_historical_data, timeout)
+
+
+class MultiTopicReader(_Reading[T], MultiTopicReaderPortal[T], Generic[T]):
+    """Reads the joined samples of a MultiTopic: see ``ddsi.MultiTopicReader``."""
+
+    def __init__(
+        self,
+        parent: DomainParticipant | Subscriber,
+        topic: MultiTopic[T],
+        qos: Qos | None = None,
+        *,
+        listener: Listener | None = None,
+    ) -> None:
+        """Raises what DataReader raises; then nothing has been created."""
+        MultiTopicReaderPortal.__init__(self, parent, topic, qos)
+        self.set_listener(listener)
+
+    def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
+        """Until of each topic at least ``count`` writers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        self._engine.run(self._inner.wait_for_matched, count, timeout)
 
 
 class BuiltinTopicReader(_Reading[B], BuiltinTopicReaderPortal[B], Generic[B]):

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any, Generic, TypedDict, TypeVar
 
 from .. import dcps
+from ..dcps.sample_reader import SampleReader
 from ..structure.builtin_topic_data import (
     ParticipantBuiltinTopicData,
     PublicationBuiltinTopicData,
@@ -21,20 +22,14 @@ from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos
 from .call import Lane
 from .engine_thread import EngineThread
-from .entities import (
-    EntityPortal,
-    FilteredTopicPortal,
-    GroupPortal,
-    ParticipantPortal,
-    SubscriberPortal,
-    TopicPortal,
-    check_parent,
-)
+from .entities import EntityPortal, GroupPortal, ParticipantPortal, SubscriberPortal, check_parent
 from .fetching import Fetching
+from .topics import FilteredTopicPortal, MultiTopicPortal, TopicPortal
 
 __all__ = [
     "BuiltinTopicReaderPortal",
     "InstanceSelection",
+    "MultiTopicReaderPortal",
     "ReaderPortal",
     "SampleReaderPortal",
     "Selection",
@@ -139,20 +134,16 @@ class WriterPortal(EntityPortal, Generic[T]):
 
 
 class SampleReaderPortal(Fetching[dcps.Sample[T]], EntityPortal, Generic[T]):
-    """What readers of topics and of builtin topics share.
+    """What readers of topics, of builtin topics and of joined ones share.
 
     Iteration fetches what is there, at most 64 samples at once, as crossing threads costs more than a sample does.
     What was fetched and not yet handed out has been taken as far as the reader is concerned.
     """
 
-    def __init__(self, engine: EngineThread, inner: dcps.DataReader[T] | dcps.BuiltinTopicReader[Any]) -> None:
+    def __init__(self, engine: EngineThread, inner: SampleReader[T]) -> None:
         super().__init__(engine, inner)
         self._source = inner
         self._fetched: deque[dcps.Sample[T]] = deque()
-
-    @property
-    def guid(self) -> Guid:
-        return self._source.guid
 
     def _is_at_end(self) -> bool:
         return self._entity.is_closed
@@ -200,7 +191,35 @@ class BuiltinTopicReaderPortal(SampleReaderPortal[B]):
         check_parent(participant, ParticipantPortal)
         self._participant = participant
         create = partial(dcps.BuiltinTopicReader, participant._inner, kind)
-        super().__init__(participant._engine, participant._ask(create))
+        self._inner: dcps.BuiltinTopicReader[Any] = participant._ask(create)
+        super().__init__(participant._engine, self._inner)
+
+    @property
+    def guid(self) -> Guid:
+        """Its own, which no other participant knows."""
+        return self._inner.guid
+
+
+class MultiTopicReaderPortal(SampleReaderPortal[T]):
+    """A reader of joined topics."""
+
+    STATUSES = dcps.MultiTopicReader.STATUSES
+
+    def __init__(
+        self, parent: ParticipantPortal | GroupPortal, topic: MultiTopicPortal[T], qos: Qos | None = None
+    ) -> None:
+        """As ``ddsi.MultiTopicReader``; ``parent`` and ``topic`` are of this module."""
+        check_parent(parent, ParticipantPortal, GroupPortal)
+        check_parent(topic, MultiTopicPortal)
+        self._parent = parent
+        self._topic = topic
+        create = partial(dcps.MultiTopicReader, parent._inner, topic._inner, qos)  # type: ignore[arg-type]
+        self._inner: dcps.MultiTopicReader[T] = topic._participant._ask(create)
+        super().__init__(topic._participant._engine, self._inner)
+
+    @property
+    def topic(self) -> MultiTopicPortal[T]:
+        return self._topic
 
 
 class ReaderPortal(SampleReaderPortal[T]):
@@ -224,6 +243,10 @@ class ReaderPortal(SampleReaderPortal[T]):
         super().__init__(topic._participant._engine, self._inner)
         if isinstance(parent, SubscriberPortal):
             parent._readers[self._inner] = self
+
+    @property
+    def guid(self) -> Guid:
+        return self._inner.guid
 
     def close(self) -> None:
         super().close()

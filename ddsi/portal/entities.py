@@ -9,10 +9,10 @@ from __future__ import annotations
 import warnings
 import weakref
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Self, TypeVar
 
 from .. import dcps
 from ..config import Config
@@ -31,16 +31,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "EntityPortal",
-    "FilteredTopicPortal",
     "GroupPortal",
     "ParticipantPortal",
     "PublisherPortal",
     "SubscriberPortal",
-    "TopicPortal",
     "check_parent",
 ]
 
-T = TypeVar("T")
 S = TypeVar("S")
 
 
@@ -219,82 +216,6 @@ class ParticipantPortal(EntityPortal):
         if self._stay is None or self._inner.is_closed:
             return function()
         return self._engine.run_now(function)
-
-
-class TopicPortal(EntityPortal, Generic[T]):
-    """A topic; what it offers is fixed."""
-
-    STATUSES = dcps.Topic.STATUSES
-
-    def __init__(self, participant: ParticipantPortal, name: str, type_: type[T], qos: Qos | None = None) -> None:
-        """As ``ddsi.Topic``; ``participant`` is one of this module's."""
-        check_parent(participant, ParticipantPortal)
-        self._participant = participant
-        self._inner: dcps.Topic[T] = participant._ask(partial(dcps.Topic, participant._inner, name, type_, qos))
-        super().__init__(participant._engine, self._inner)
-
-    @property
-    def name(self) -> str:
-        return self._inner.name
-
-    @property
-    def type(self) -> type[T]:
-        return self._inner.type
-
-    @property
-    def type_name(self) -> str:
-        return self._inner.type_name
-
-
-class FilteredTopicPortal(EntityPortal, Generic[T]):
-    """Given to a reader in a topic's place, lets it see only what passes."""
-
-    STATUSES = dcps.ContentFilteredTopic.STATUSES
-
-    def __init__(
-        self,
-        participant: ParticipantPortal,
-        name: str,
-        topic: TopicPortal[T],
-        expression: str,
-        parameters: Sequence[str] = (),
-    ) -> None:
-        """As ``ddsi.ContentFilteredTopic``; ``participant`` and ``topic`` are of this module."""
-        check_parent(participant, ParticipantPortal)
-        check_parent(topic, TopicPortal)
-        self._participant = participant
-        self._topic = topic
-        create = partial(dcps.ContentFilteredTopic, participant._inner, name, topic._inner, expression, parameters)
-        self._inner: dcps.ContentFilteredTopic[T] = participant._ask(create)
-        super().__init__(participant._engine, self._inner)
-
-    @property
-    def name(self) -> str:
-        return self._inner.name
-
-    @property
-    def related_topic(self) -> TopicPortal[T]:
-        return self._topic
-
-    @property
-    def type(self) -> type[T]:
-        return self._inner.type
-
-    @property
-    def type_name(self) -> str:
-        return self._inner.type_name
-
-    @property
-    def filter_expression(self) -> str:
-        return self._inner.filter_expression
-
-    @property
-    def expression_parameters(self) -> tuple[str, ...]:
-        return self._inner.expression_parameters
-
-    def set_expression_parameters(self, parameters: Sequence[str]) -> None:
-        """From now on these are the values of %0, %1 and so on: see ``ddsi.ContentFilteredTopic``."""
-        self._ask(partial(self._inner.set_expression_parameters, parameters))
 
 
 class GroupPortal(EntityPortal):

@@ -6,15 +6,28 @@ import asyncio
 import functools
 import threading
 from collections.abc import Awaitable, Callable
-from typing import Any, ParamSpec, assert_type
+from typing import Annotated, Any, ParamSpec, assert_type
 
 import pytest
 
 import ddsi
-from ddsi import aio
+from ddsi import aio, idl
 from tests.dcps.running import RELIABLE, Note, Shape
 
 P = ParamSpec("P")
+
+
+@idl.struct
+class Plan:
+    color: Annotated[str, idl.key, idl.bound(128)]
+    owner: str = ""
+
+
+@idl.struct
+class Owned:
+    color: Annotated[str, idl.key, idl.bound(128)]
+    x: idl.int32
+    owner: str = ""
 
 
 def in_asyncio(test: Callable[P, Awaitable[None]]) -> Callable[P, None]:
@@ -351,3 +364,32 @@ async def test_conditions_filters_and_groups(domain: int) -> None:
         await asyncio.sleep(0)
         guard.set_trigger_value(True)
         assert await waiting == [guard]
+
+
+@in_asyncio
+async def test_topics_are_joined(domain: int) -> None:
+    async with aio.DomainParticipant(domain) as participant:
+        shapes = aio.DataWriter(participant, aio.Topic(participant, "Square", Shape), RELIABLE)
+        plans = aio.DataWriter(participant, aio.Topic(participant, "Plan", Plan), RELIABLE)
+        text = "SELECT color, x, owner FROM Square NATURAL JOIN Plan WHERE x < %0"
+        topic = aio.MultiTopic(participant, "Owned", Owned, text, ["10"])
+        assert (topic.name, topic.subscription_expression, topic.expression_parameters) == ("Owned", text, ("10",))
+        reader = aio.MultiTopicReader(participant, topic, RELIABLE)
+        assert_type(reader, aio.MultiTopicReader[Owned])
+        await reader.wait_for_matched(timeout=5)
+        waiting = asyncio.create_task(reader.__anext__())
+        await shapes.write_all([Shape("BLUE", 1), Shape("RED", 20)])
+        await plans.write_all([Plan("BLUE", "Ada"), Plan("RED", "Bob")])
+        sample = await waiting
+        assert_type(sample, ddsi.Sample[Owned])
+        assert sample.data == Owned("BLUE", 1, "Ada")
+        assert await reader.take() == []
+        topic.set_expression_parameters(["100"])
+        await reader.wait(aio.QueryCondition(reader, expression="x > 10"))
+        assert Owned("RED", 20, "Bob") in [sample.data for sample in await reader.take()]
+        with pytest.raises(ddsi.BadParameter, match="has no topic 'Plans'"):
+            aio.MultiTopic(participant, "Owned", Owned, "SELECT * FROM Plans")
+        inner: Any = topic._inner
+        with pytest.raises(ddsi.BadParameter, match=r"ddsi\.aio"):
+            aio.MultiTopicReader(participant, inner)
+    assert [sample async for sample in reader] == []

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import gc
+import queue
 import threading
 import weakref
 from collections.abc import Callable
-from typing import Any, assert_type
+from typing import Annotated, Any, assert_type
 
 import pytest
 
 import ddsi
-from ddsi import blocking
-from ddsi.portal.entities import TopicPortal
+from ddsi import blocking, idl
+from ddsi.portal.topics import TopicPortal
 from tests.dcps.running import RELIABLE, Note, Shape
+
+
+@idl.struct
+class Plan:
+    color: Annotated[str, idl.key, idl.bound(128)]
+    owner: str = ""
+
+
+@idl.struct
+class Owned:
+    color: Annotated[str, idl.key, idl.bound(128)]
+    x: idl.int32
+    owner: str = ""
 
 
 def _threads() -> list[str]:
@@ -425,3 +439,50 @@ def test_instances_entities_and_what_is_ignored(domain: int) -> None:
                 ignoring.wait_for_matched(timeout=0.2)
         participant.delete_contained_entities()
         assert pair.reader.is_closed
+
+
+def test_topics_are_joined(domain: int) -> None:
+    with blocking.DomainParticipant(domain) as participant:
+        shapes = blocking.DataWriter(participant, blocking.Topic(participant, "Square", Shape), RELIABLE)
+        plans = blocking.DataWriter(participant, blocking.Topic(participant, "Plan", Plan), RELIABLE)
+        text = "SELECT color, x, owner FROM Square NATURAL JOIN Plan WHERE x < %0"
+        topic = blocking.MultiTopic(participant, "Owned", Owned, text, ["10"])
+        assert (topic.name, topic.subscription_expression, topic.expression_parameters) == ("Owned", text, ("10",))
+        reader = blocking.MultiTopicReader(blocking.Subscriber(participant), topic, RELIABLE)
+        assert_type(reader, blocking.MultiTopicReader[Owned])
+        reader.wait_for_matched(timeout=5)
+        shapes.write_all([Shape("BLUE", 1), Shape("RED", 20)])
+        with pytest.raises(ddsi.DdsTimeout, match="no such sample"):
+            reader.wait(timeout=0.01)
+        plans.write_all([Plan("BLUE", "Ada"), Plan("RED", "Bob")])
+        assert next(reader).data == Owned("BLUE", 1, "Ada")
+        assert reader.take() == []
+        topic.set_expression_parameters(["100"])
+        reader.wait(blocking.QueryCondition(reader, expression="x > 10"), timeout=5)
+        assert Owned("RED", 20, "Bob") in [sample.data for sample in reader.take()]
+        with pytest.raises(ddsi.BadParameter, match="has no topic 'Plans'"):
+            blocking.MultiTopic(participant, "Owned", Owned, "SELECT * FROM Plans")
+        inner: Any = topic._inner
+        with pytest.raises(ddsi.BadParameter, match=r"ddsi\.blocking"):
+            blocking.MultiTopicReader(participant, inner)
+    assert list(reader) == []
+
+
+def test_a_listener_is_told_when_samples_are_joined(domain: int) -> None:
+    joined: queue.SimpleQueue[Owned] = queue.SimpleQueue()
+
+    class Taking(blocking.Listener):
+        def on_data_available(self, reader: blocking.MultiTopicReader[Owned]) -> None:
+            for sample in reader.take():
+                joined.put(sample.data)
+
+    with blocking.DomainParticipant(domain) as participant:
+        shapes = blocking.DataWriter(participant, blocking.Topic(participant, "Square", Shape), RELIABLE)
+        plans = blocking.DataWriter(participant, blocking.Topic(participant, "Plan", Plan), RELIABLE)
+        topic = blocking.MultiTopic(participant, "Owned", Owned, "SELECT * FROM Square NATURAL JOIN Plan")
+        reader = blocking.MultiTopicReader(participant, topic, RELIABLE, listener=Taking())
+        reader.wait_for_matched(timeout=5)
+        plans.write(Plan("BLUE", "Ada"))
+        for number in range(3):
+            shapes.write(Shape("BLUE", number))
+            assert joined.get(timeout=10) == Owned("BLUE", number, "Ada")
