@@ -12,7 +12,7 @@ from .. import model
 from ..model import Extensibility, Primitive
 from .annotations import Annotations
 from .composites import CompositeAnalysis
-from .constants import evaluate, fitted
+from .constants import evaluate, fitted, unsigned_bits
 from .declarations import (
     Alias,
     ArrayOf,
@@ -113,7 +113,7 @@ class _Analysis(CompositeAnalysis):
     def _const(self, node: ConstNode) -> None:
         type_ = self.type_of(node.type)
         Annotations(node.annotations, self.lookup, self.warnings).warn_of_the_rest()
-        value = fitted(evaluate(node.value, self.lookup), type_, node.value.place)
+        value = fitted(evaluate(node.value, self.lookup, bits=unsigned_bits(type_)), type_, node.value.place)
         self.add(Constant(self.path(node.name), node.place, node.comment, type=type_, value=value))
 
     def _typedef(self, node: TypedefNode) -> None:

@@ -163,7 +163,7 @@ class Annotations:
 
     def representations(self) -> tuple[DataRepresentationId, ...]:
         """``@data_representation(XCDR2)``, or several joined by ``|``; none where it is not there."""
-        given = self.argument("data_representation", "XCDR1 or XCDR2")
+        given = self.argument("data_representation", "XCDR1 or XCDR2", parameter="allowed_kinds")
         found: list[DataRepresentationId] = []
         pending = [] if given is None else [given]
         while pending:
@@ -178,11 +178,12 @@ class Annotations:
                     raise IdlError(other.place, "@data_representation takes XCDR1, XCDR2 or XML, joined by |")
         return tuple(found)
 
-    def argument(self, name: str, expected: str) -> Expression | None:
+    def argument(self, name: str, expected: str, *, parameter: str = "value") -> Expression | None:
+        """The one argument, be it named or not."""
         annotation = self.find(name)
         if annotation is None:
             return None
-        given = annotation.arguments.get("value")
+        given = annotation.arguments.get(parameter) or annotation.arguments.get("value")
         if given is None:
             raise IdlError(annotation.place, f"@{name} takes {expected}, as in @{name}(...)")
         return given

@@ -13,7 +13,7 @@ from ..annotations import LARGEST_MEMBER_ID, autoid_hash
 from ..model import Extensibility, Limits, Primitive, String
 from ..recursion import DEEPEST_COLLECTION
 from .annotations import Annotations
-from .constants import evaluate, fitted
+from .constants import evaluate, fitted, unsigned_bits
 from .declarations import (
     Alias,
     ArrayOf,
@@ -174,6 +174,9 @@ class CompositeAnalysis:
         if node.base is not None:
             struct.base = self._base_struct(node.base)
             struct.levels = struct.base.levels
+            if struct.base.extensibility is not struct.extensibility:  # §7.2.2.4.5: both are of one kind
+                kinds = f"{struct.extensibility.value}, and its base {struct.base.extensibility.value}"
+                self.warnings.append(IdlWarning(node.place, f"{node.name} is {kinds}: other compilers refuse that"))
         annotations.warn_of_the_rest()
         inherited = self._all_members(struct, node.place)
         taken = {member.name.lower(): member for member in inherited}
@@ -331,6 +334,13 @@ class CompositeAnalysis:
             union.levels = self._checked_levels(union, member)
         if not union.members:
             raise IdlError(node.place, f"{node.name} has no case; a union has one at least")
+        default = next((member for member in union.members if member.is_default_case), None)
+        values = len(bare.literals) if isinstance(bare, EnumDeclaration) else 2 if bare == model.BOOLEAN else 0
+        if default is not None and values and len(labels) == values:
+            raise IdlError(
+                default.place,
+                f"{default.name} is never chosen, as each value of the discriminator has a case of its own",
+            )
         union.is_defined = True
         self.declarations.append(union)
 
@@ -372,7 +382,7 @@ class CompositeAnalysis:
             if expression.parts[-1] in discriminator.flags:
                 return Bitflag(expression.parts[-1], discriminator)
             raise IdlError(expression.place, f"{discriminator.scoped_name} has no flag {expression}")
-        return evaluate(expression, self.lookup)
+        return evaluate(expression, self.lookup, bits=unsigned_bits(discriminator))
 
     # --- keylists ----------------------------------------------------------------------------------------
 

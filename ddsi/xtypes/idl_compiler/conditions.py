@@ -6,12 +6,16 @@ The preprocessor has expanded macros already; names that are left are 0, as in C
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Callable, Sequence
 
 from .source_text import IdlError, Place
 from .tokens import Token, TokenKind
 
 __all__ = ["divide", "evaluate_condition", "remainder"]
+
+_INTEGER = re.compile(r"(0[xX][0-9A-Fa-f]{1,40}|[0-9]{1,40})[uUlL]{0,3}")
+"""With the suffixes of C, as in ``__cplusplus >= 201103L``."""
 
 _DEEPEST = 120
 _LARGEST = 1 << 64
@@ -113,8 +117,9 @@ class _Condition:
                     raise self._unexpected("')'")
                 self._next += 1
                 return value
-        if token.kind is TokenKind.INTEGER:
-            return int(token.text, 16 if token.text[:2] in ("0x", "0X") else 8 if _is_octal(token.text) else 10)
+        if number := _INTEGER.fullmatch(token.text):
+            digits = number[1]
+            return int(digits, 16 if digits[:2] in ("0x", "0X") else 8 if _is_octal(digits) else 10)
         if token.kind is TokenKind.NAME:
             return int(token.text in ("TRUE", "true"))
         self._next -= 1

@@ -27,7 +27,7 @@ from .declarations import (
 from .source_text import IdlError, Place
 from .syntax import Binary, Expression, Literal, Name, Unary
 
-__all__ = ["Lookup", "evaluate", "fitted"]
+__all__ = ["Lookup", "evaluate", "fitted", "unsigned_bits"]
 
 Lookup = Callable[[Name], Declaration]
 
@@ -53,19 +53,31 @@ _FLOATING_SIGNS: dict[str, Callable[[float, float], float]] = {
 }
 
 
-def evaluate(expression: Expression, lookup: Lookup) -> ConstantValue:
-    """The value of an expression; ``lookup`` finds what a name means.  IdlError where it has none."""
+def unsigned_bits(type_: TypeReference) -> int:
+    """How many bits an unsigned integer type has; 0 for all others."""
+    type_ = unaliased(type_)
+    if isinstance(type_, Primitive) and type_.is_number and type_.code.isupper():
+        return 8 * type_.size
+    return 0
+
+
+def evaluate(expression: Expression, lookup: Lookup, *, bits: int = 0) -> ConstantValue:
+    """The value of an expression; ``lookup`` finds what a name means.  IdlError where it has none.
+
+    ``bits`` are those of the unsigned type that the expression is for, in which ``~`` is (2**bits - 1) - value; 0 for
+    other types, in which it is -(value + 1).
+    """
     chain: list[Binary] = []
     while isinstance(expression, Binary):  # a loop, as a sum of thousands leans to the left
         chain.append(expression)
         expression = expression.left
-    value = _operand(expression, lookup)
+    value = _operand(expression, lookup, bits)
     for binary in reversed(chain):
-        value = _combined(binary, value, evaluate(binary.right, lookup))
+        value = _combined(binary, value, evaluate(binary.right, lookup, bits=bits))
     return value
 
 
-def _operand(expression: Expression, lookup: Lookup) -> ConstantValue:
+def _operand(expression: Expression, lookup: Lookup, bits: int) -> ConstantValue:
     match expression:
         case Literal(value=value):
             return value
@@ -77,16 +89,16 @@ def _operand(expression: Expression, lookup: Lookup) -> ConstantValue:
                 return found
             raise IdlError(expression.place, f"expected a constant; {expression} is none")
         case Unary(sign=sign, operand=operand, place=place):
-            return _signed(sign, evaluate(operand, lookup), place)
+            return _signed(sign, evaluate(operand, lookup, bits=bits), place, bits)
         case _:
-            return evaluate(expression, lookup)
+            return evaluate(expression, lookup, bits=bits)
 
 
-def _signed(sign: str, value: ConstantValue, place: Place) -> ConstantValue:
+def _signed(sign: str, value: ConstantValue, place: Place, bits: int) -> ConstantValue:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or (sign == "~" and isinstance(value, float)):
         raise IdlError(place, f"'{sign}' takes {'an integer' if sign == '~' else 'a number'}, not {_shown(value)}")
     if sign == "~":
-        return ~int(value)
+        return ~int(value) & ((1 << bits) - 1) if bits else ~int(value)
     return -value if sign == "-" else value
 
 
@@ -121,6 +133,8 @@ def fitted(value: ConstantValue, type_: TypeReference, place: Place) -> Constant
         case String(bound=bound, wide=wide):
             if not isinstance(value, str):
                 raise IdlError(place, f"expected a string, found {_shown(value)}")
+            if "\0" in value:
+                raise IdlError(place, "a string contains no NUL, which ends it on the wire")
             length = (
                 len(value.encode("utf-16-le", "surrogatepass")) // 2 if wide else len(value.encode(errors="replace"))
             )

@@ -270,7 +270,7 @@ class _Writer:
         lines = [*_type_marks(type_), f"struct {_escaped(name)}{base} {{"]
         due = inherited[-1].id + 1 if inherited else 0
         for member in type_.declared[len(inherited) :]:
-            marks = self._member_marks(member, due)
+            marks = self._member_marks(member, due, is_hashed=type_.has_hashed_ids)
             lines.append(f"{_INDENT}{marks}{self._declarator(member, name)};")
             due = member.id + 1
         return [*lines, "};"]
@@ -287,7 +287,8 @@ class _Writer:
         for case in type_.cases:
             lines += [f"{_INDENT}case {self._label(discriminator, label)}:" for label in case.labels]
             lines += [f"{_INDENT}default:"] if case.is_default else []
-            lines.append(f"{_INDENT * 2}{self._member_marks(case, due)}{self._declarator(case, name)};")
+            marks = self._member_marks(case, due, is_hashed=type_.has_hashed_ids)
+            lines.append(f"{_INDENT * 2}{marks}{self._declarator(case, name)};")
             due = case.id + 1
         return [*lines, "};"]
 
@@ -296,14 +297,15 @@ class _Writer:
             return _literal_name(label)
         return self._constant(discriminator, label)
 
-    def _member_marks(self, member: Member, due: int) -> str:
-        marks = []
-        if member.is_key:
-            marks.append("@key")
-        if member.id != due and member.id == autoid_hash(member.name_in_idl):
-            marks.append("@hashid")
-        elif member.id != due:
-            marks.append(f"@id({member.id})" if member.id < 1 << 16 else f"@id({member.id:#x})")
+    def _member_marks(self, member: Member, due: int, *, is_hashed: bool) -> str:
+        """``due`` is the id that the member has by its place, unless ids ``is_hashed`` are derived from names."""
+        marks = ["@key"] if member.is_key else []
+        own_hash = autoid_hash(member.name_in_idl)
+        if member.hash_name is not None and member.id == autoid_hash(member.hash_name or member.name_in_idl):
+            marks.append(f"@hashid({self._constant(String(), member.hash_name)})" if member.hash_name else "@hashid")
+        elif member.id != (own_hash if is_hashed else due):
+            by_number = f"@id({member.id})" if member.id < 1 << 16 else f"@id({member.id:#x})"
+            marks.append("@hashid" if member.id == own_hash else by_number)
         if member.is_optional:
             marks.append("@optional")
         if member.must_understand:
@@ -452,6 +454,7 @@ def _template(name: str, parts: list[str], bound: int | None) -> str:
 def _type_marks(type_: Composite) -> list[str]:
     marks = [f"@{type_.extensibility.value}"]
     marks += ["@nested"] if type_.is_nested else []
+    marks += ["@autoid(HASH)"] if type_.has_hashed_ids else []
     if isinstance(type_, StructType) and type_.representations:
         names = [representation.name for representation in type_.representations]
         marks.append(f"@data_representation({' | '.join(names)})")

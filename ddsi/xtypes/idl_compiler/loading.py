@@ -77,7 +77,7 @@ def load_file(path: str | Path, **options: Any) -> Namespace:
 
 def load_text(text: str, **options: Any) -> Namespace:
     """See :func:`ddsi.idl.loads`."""
-    return _run(compile_idl(SourceText("<text>", text), None, **options), "<text>", "idl_text")
+    return _run(compile_idl(SourceText("<text>", text.removeprefix("\ufeff")), None, **options), "<text>", "idl_text")
 
 
 def _run(compilation: Compilation, title: str, module_name: str) -> Namespace:

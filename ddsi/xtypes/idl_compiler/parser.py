@@ -7,7 +7,7 @@ IdlError says what was expected.  Interfaces and their like, which are no data, 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from .annotations import BUILTIN
 from .expressions import KEYWORDS, ExpressionParser
@@ -88,6 +88,13 @@ class Parser(ExpressionParser):
         self.warnings: list[IdlWarning] = []
         self._declared: set[str] = set()
         """Annotations that the text itself declares: for other programs, and no mistake."""
+        self._constructed: dict[str, Callable[[], list[Definition]]] = {
+            "struct": self._struct,
+            "union": self._union,
+            "enum": self._enum,
+            "bitmask": self._bitmask,
+            "bitset": self._bitset,
+        }
 
     def specification(self) -> list[Definition]:
         """All definitions, up to the end."""
@@ -110,16 +117,8 @@ class Parser(ExpressionParser):
             return []
         annotations = self.annotations()
         word = self.token.text
-        parse = {
-            "module": self._module,
-            "const": self._const,
-            "typedef": self._typedef,
-            "struct": self._struct,
-            "union": self._union,
-            "enum": self._enum,
-            "bitmask": self._bitmask,
-            "bitset": self._bitset,
-        }.get(word)
+        simple = {"module": self._module, "const": self._const, "typedef": self._typedef}
+        parse = simple.get(word) or self._constructed.get(word)
         if parse is not None:
             definitions = parse()
         elif word in _SKIPPED or word in _IN_MODIFIERS:
@@ -127,7 +126,7 @@ class Parser(ExpressionParser):
         else:
             raise self.unexpected("a definition (module, struct, union, enum, typedef, const, ...)")
         for definition in definitions:
-            definition.annotations = annotations
+            definition.annotations = definition.annotations or annotations
             definition.comment = comment
         self.expect(";", f"behind the {word}")
         return definitions
@@ -151,9 +150,17 @@ class Parser(ExpressionParser):
         return [ConstNode(name=name.text, place=name.place, type=type_, value=self.expression())]
 
     def _typedef(self) -> list[Definition]:
+        """Of any type, also of one that is defined in the typedef itself."""
         self.take()
-        type_ = self._type()
+        annotations = self.annotations()
         found: list[Definition] = []
+        define = self._constructed.get(self.token.text)
+        if define is None:
+            type_ = self._type()
+        else:
+            found = define()
+            found[0].annotations = annotations
+            type_ = NameSpec(Name((found[0].name,), False, found[0].place))
         for declarator in self._declarators("of the typedef"):
             found.append(
                 TypedefNode(name=declarator.name, place=declarator.place, type=type_, dimensions=declarator.dimensions)
@@ -434,6 +441,8 @@ class Parser(ExpressionParser):
         found: list[Annotation] = []
         while self.token.text == "@":
             place = self.take().place
+            if self.token.text == "::":
+                self.take()
             name = self.name("of the annotation", any_word=True).text
             while self.token.text == "::" and not self.token.spaced:  # else it begins the type behind the annotation
                 self.take()

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from .conditions import evaluate_condition
 from .source_text import IdlError, IdlWarning, Place, SourceText
-from .tokens import Token, TokenKind, tokenize
+from .tokens import Token, TokenKind, refuse_odd, tokenize
 
 __all__ = ["Preprocessor"]
 
@@ -67,7 +67,7 @@ class Preprocessor:
 
     def tokens(self, source: SourceText, path: Path | None = None) -> list[Token]:
         """The tokens of ``source`` after preprocessing, the end as the last.  ``path`` is where it was read."""
-        found = list(self._file(source, path, depth=0))
+        found = list(map(refuse_odd, self._file(source, path, depth=0)))
         return [*found, Token(TokenKind.END, "", Place(source, len(source.text)))]
 
     # --- files and lines ---------------------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 Comments are dropped, but the comment right before a token stays with it, since it may describe what the token
 begins.  A backslash at the end of a line joins it to the next.  ``>`` is always a token of its own: two of them close
-nested templates, or are a shift, as the parser finds.  Time is linear in the text.
+nested templates, or are a shift, as the parser finds.  What is no token of IDL is an odd one, and refused only where it
+matters (:func:`refuse_odd`): conditions may leave out text in other languages.  Time is linear in the text.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from enum import Enum
 
 from .source_text import IdlError, Place, SourceText
 
-__all__ = ["Token", "TokenKind", "tokenize"]
+__all__ = ["Token", "TokenKind", "refuse_odd", "tokenize"]
 
 
 class TokenKind(Enum):
@@ -25,6 +26,8 @@ class TokenKind(Enum):
     CHARACTER = "character"
     PUNCTUATION = "punctuation"
     PRAGMA = "pragma"
+    ODD = "odd"
+    """No token of IDL: a stray character or quote, or a number such as ``201103L``."""
     END = "end of the text"
 
 
@@ -74,7 +77,7 @@ _KINDS = {
 
 
 def tokenize(source: SourceText) -> Iterator[Token]:
-    """The tokens of a text, the end as the last.  IdlError for a character, number or comment that is none."""
+    """The tokens of a text, the end as the last.  IdlError for a comment without end."""
     text, position, end = source.text, 0, len(source.text)
     starts_line, spaced, comments = True, False, list[str]()
     while position < end:
@@ -92,13 +95,13 @@ def tokenize(source: SourceText) -> Iterator[Token]:
             spaced = True
         else:
             found = _TOKEN.match(text, position)
-            if found is None:
-                raise IdlError(Place(source, position), _unexpected(text, position))
-            kind = _KINDS[found.lastgroup or ""]
-            if kind in (TokenKind.INTEGER, TokenKind.FLOATING) and not _is_number(found.group()):
-                raise IdlError(Place(source, position), f"'{found.group()[:80]}' is no number")
-            yield Token(kind, found.group(), Place(source, position), starts_line, spaced, "\n".join(comments))
-            starts_line, spaced, comments, position = False, False, [], found.end()
+            kind, word = TokenKind.ODD, character
+            if found is not None:
+                kind, word = _KINDS[found.lastgroup or ""], found.group()
+                if kind in (TokenKind.INTEGER, TokenKind.FLOATING) and not _is_number(word):
+                    kind = TokenKind.ODD
+            yield Token(kind, word, Place(source, position), starts_line, spaced, "\n".join(comments))
+            starts_line, spaced, comments, position = False, False, [], position + len(word)
     yield Token(TokenKind.END, "", Place(source, end), True, True)
 
 
@@ -122,9 +125,14 @@ def _comment(source: SourceText, start: int) -> tuple[int, str]:
     return end + 2, "\n".join(lines).strip()
 
 
-def _unexpected(text: str, position: int) -> str:
-    character = text[position]
-    if character in "\"'":
-        what = "string" if character == '"' else "character"
-        return f"the {what} has no end on this line; expected {character}"
-    return f"the character {character!r} has no meaning here"
+def refuse_odd(token: Token) -> Token:
+    """The token; IdlError where it is an odd one, with what is odd about it."""
+    if token.kind is not TokenKind.ODD:
+        return token
+    word = token.text
+    if word in ("'", '"'):
+        what = "string" if word == '"' else "character"
+        raise IdlError(token.place, f"the {what} has no end on this line; expected {word}")
+    if len(word) == 1:
+        raise IdlError(token.place, f"the character {word!r} has no meaning here")
+    raise IdlError(token.place, f"'{word[:80]}' is no number")

@@ -13,6 +13,7 @@ ERRORS: dict[str, tuple[str, int, int, str]] = {
     "odd character": ("struct A { long x; $ };", 1, 20, "the character '$' has no meaning here"),
     "open comment": ("struct A {\n /* long x; };", 2, 2, "the comment has no end; expected '*/'"),
     "open string": ('const string S = "abc;\n', 1, 18, 'the string has no end on this line; expected "'),
+    "odd macro": ("#define N 5L\n#if N > 4\nconst long M = N;\n#endif", 3, 16, "'5L' is no number"),
     "odd number": ("const long N = 12abc;", 1, 16, "'12abc' is no number"),
     "odd octal": ("const long N = 089;", 1, 16, "'089' is octal, as it begins with 0, but has other digits"),
     "two characters": ("const char C = 'ab';", 1, 16, "''ab'' is not one character"),
@@ -180,6 +181,24 @@ ERRORS: dict[str, tuple[str, int, int, str]] = {
     ),
     "label does not fit": ("union U switch (octet) { case 300: long x; };", 1, 31, "300 does not fit octet (0 to 255)"),
     "label twice": ("union U switch (long) { case 1: long x; case 1: long y; };", 1, 46, "the label is also that of x"),
+    "default of all booleans": (
+        "union U switch (boolean) { case TRUE: case FALSE: long x; default: long y; };",
+        1,
+        73,
+        "y is never chosen, as each value of the discriminator has a case of its own",
+    ),
+    "default of a whole enum": (
+        "enum E { A };\nunion U switch (E) { default: long y; case A: long x; };",
+        2,
+        36,
+        "y is never chosen, as each value of the discriminator has a case of its own",
+    ),
+    "NUL in a string": (
+        'struct A { @default("a\\0") string x; };',
+        1,
+        21,
+        "a string contains no NUL, which ends it on the wire",
+    ),
     "default twice": (
         "union U switch (long) { default: long x; default: long y; };",
         1,

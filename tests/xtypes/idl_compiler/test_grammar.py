@@ -82,6 +82,9 @@ CONSTANTS: dict[str, Any] = {
     "wchar N = L'\\u20ac'": "\u20ac",
     'string N = "a" "b\\tc"': "ab\tc",
     'wstring N = L"wide"': "wide",
+    "unsigned long N = ~0": 0xFFFFFFFF,
+    "octet N = (~1 & ~2) >> 1": 0x7E,
+    "unsigned long long N = ~~5": 5,
     "octet N = M + inner::M": 5,
     "octet N = ::M": 2,
 }
@@ -163,6 +166,37 @@ def test_the_innermost_name_is_meant() -> None:
     assert str(struct_type(types.R).members[0].type) == "P"
 
 
+def test_a_typedef_may_define_its_type() -> None:
+    types = idl.loads("typedef @final struct P { long x; } Q, R[2]; typedef enum E { A, B } F; struct T { R r; F f; };")
+    assert struct_type(types.P).extensibility is Extensibility.FINAL
+    assert [str(found.type) for found in struct_type(types.T).members] == ["P[2]", "E"]
+
+
+def test_complements_in_labels_are_those_of_the_discriminator() -> None:
+    types = idl.loads("union U switch (unsigned short) { case ~0: long x; };")
+    assert types.U(x=1).discriminator == 0xFFFF
+
+
+def test_annotations_may_have_scoped_names_and_named_arguments() -> None:
+    types = idl.loads(
+        "module m { @annotation Mark { }; };"
+        "@::m::Mark @data_representation(allowed_kinds=XCDR2) struct T { @m::Mark @id(value=3) long x; };"
+    )
+    assert types.idl_warnings == ()
+    assert member(types.T, "x").id == 3
+    assert struct_type(types.T).representations == (idl.XCDR2,)
+
+
+def test_a_base_of_another_extensibility_is_warned_of() -> None:
+    types = idl.loads("@final struct B { long x; };\n@appendable struct D : B { long y; };")
+    (warning,) = types.idl_warnings
+    assert str(warning) == "<text>:2:20: D is appendable, and its base final: other compilers refuse that"
+
+
+def test_a_byte_order_mark_is_no_text() -> None:
+    assert list(idl.loads("\ufeffstruct T { long x; };")) == ["T"]
+
+
 def test_inheritance_continues_the_ids() -> None:
     types = idl.loads("struct A { @key long a; @id(5) long b; }; struct B : A { long c; };")
     assert [(found.name, found.id) for found in struct_type(types.B).members] == [("a", 0), ("b", 5), ("c", 6)]
@@ -182,7 +216,7 @@ def test_annotations_of_modules_hold_inside() -> None:
 
 def test_unions() -> None:
     types = idl.loads(
-        "enum E { A, B, C };"
+        "enum E { A, B, C, D };"
         "union U switch (@key E) { case A: case B: @id(9) long x; default: string y; case C: octet z[2]; };"
     )
     union = named_type(types.U)

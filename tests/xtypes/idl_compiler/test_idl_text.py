@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import ddsi
 from ddsi import BadParameter, idl
 from ddsi.xtypes.definition import struct_type
 from ddsi.xtypes.model import StructType, reachable_structs
@@ -240,3 +241,19 @@ def test_a_module_named_as_a_type_but_for_case_is_refused() -> None:
 
     with pytest.raises(BadParameter, match="Thing and the module thing have one name in IDL"):
         idl.to_idl(Thing)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "@autoid(HASH) @mutable struct T { long color; @id(3) long b; @hashid long c; long d; };",
+        '@mutable struct T { long color; @hashid("x") long b; @hashid long c; long d; };',
+        "@autoid(HASH) union T switch (long) { case 1: long a; case 2: @id(5) long b; };",
+    ],
+)
+def test_how_ids_were_given_survives(text: str) -> None:
+    """A complete TypeObject tells it, so the identifier shows whether it is the same."""
+    type_ = idl.loads(text).T
+    holder: Any = idl.struct(type("Holder", (), {"__annotations__": {"held": type_}}))
+    again: Any = idl.loads(idl.to_idl(holder)).Holder
+    assert ddsi.type_information(again).encode() == ddsi.type_information(holder).encode()
