@@ -151,16 +151,22 @@ class CryptoTransform(Protocol):
 class OpensAlike(Protocol):
     """What a CryptoTransform may offer besides, to make the path of every sample shorter.  Not the OMG's."""
 
+    def message_opener(
+        self, encoded_rtps_message: Octets, sending_participant_crypto: ParticipantCryptoHandle
+    ) -> Callable[[Octets], Octets | None] | None:
+        """A short way for messages with the same 16 octets behind their header as this one, which was just decoded.
+
+        It opens what decoding with the same handles would open, or returns None, and leaves the octets as they were;
+        then they are decoded.  It is used until keys or endpoints come or go.  None: there is no short way.
+        """
+        ...
+
     def submessage_opener(
         self,
         encoded_rtps_submessage: Octets,
         sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
     ) -> Callable[[Octets], Octets | None] | None:
-        """A short way for submessages that begin with the same 16 octets as this one, which was just decoded.
-
-        It opens what decoding with the same handles would open, or returns None, and leaves the octets as they were;
-        then they are decoded.  It is used until keys or endpoints come or go.  None: there is no short way.
-        """
+        """The same for submessages that begin with the same 16 octets."""
         ...
 
     def payload_opener(

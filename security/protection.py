@@ -52,6 +52,8 @@ _UNPROVEN_END: Final = Rejected("it ends an instance, and nothing of it is prote
 _ALIKE: Final = 16
 """So many octets at the head of a protected submessage tell the sender, the key and the session."""
 _PAYLOADS_ALIKE: Final = 12
+_RTPS_HEADER: Final = 20
+_MESSAGES_ALIKE: Final = _RTPS_HEADER + _ALIKE
 _MOST_OPENERS: Final = 4096
 _SMALL: Final = 1 << 12
 """Octets are quicker to take apart as ``bytes`` than through a view, unless it costs more to copy them."""
@@ -82,10 +84,14 @@ class Protection:
             tuple[Guid, tuple[Guid, ...]], tuple[list[DatareaderCryptoHandle], list[DatawriterCryptoHandle]]
         ] = {}
         self._short_ways = cryptographic if isinstance(cryptographic, OpensAlike) else None
+        self._message_openers: dict[bytes, tuple[bytes, Opener, RemoteParticipant]] = {}
+        """By source: what followed the header of its last message, and what opened it."""
         self._openers: dict[bytes, tuple[Opener, Pair]] = {}
         """By source and first octets of submessages: what opened the last of these, and whose they are."""
         self._payload_openers: dict[Guid, tuple[bytes, Opener]] = {}
         """By remote writer: how its last payload began, and what opened it."""
+        self._payload_pairs: dict[Guid, Pair | None] = {}
+        """By remote writer: who of ours reads protected payloads of it."""
         self._required: dict[bytes, int] = {}
         """What the submessages of a remote endpoint need; by its Guid, until anything about it changes."""
         self.refused = 0
@@ -95,8 +101,10 @@ class Protection:
         """Endpoints or participants came or went."""
         self._required.clear()
         self._handles.clear()
+        self._message_openers.clear()
         self._openers.clear()
         self._payload_openers.clear()
+        self._payload_pairs.clear()
 
     # --- outwards ----------------------------------------------------------------------------------------
 
@@ -174,12 +182,27 @@ class Protection:
     # --- inwards -----------------------------------------------------------------------------------------
 
     def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
+        known = self._message_openers.get(source)
+        if known is not None and message[_RTPS_HEADER:_MESSAGES_ALIKE] == known[0]:
+            plain = known[1](message)
+            if plain is not None:
+                known[2].opened += 1
+                return plain
+        return self._decode_message(message, source)
+
+    def _decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:
+        """The general way of :meth:`decode_message`, and of the first that each participant protects."""
         remote = self._remotes.get(source)
         if remote is None or remote.crypto is None:
-            return _no_keys(message, 20)
+            return _no_keys(message, _RTPS_HEADER)
         plain = self._cryptographic.decode_rtps_message(message, self._local_participant, remote.crypto)
-        if not isinstance(plain, Outcome):
-            remote.opened += 1
+        if isinstance(plain, Outcome):
+            return plain
+        remote.opened += 1
+        if self._short_ways is not None:
+            opener = self._short_ways.message_opener(message, remote.crypto)
+            if opener is not None:
+                self._message_openers[source] = bytes(message[_RTPS_HEADER:_MESSAGES_ALIKE]), opener, remote
         return plain
 
     def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
@@ -281,10 +304,14 @@ class Protection:
         )
 
     def _payload_pair(self, writer: Guid) -> Pair | None:
-        for pair in self._keys.by_remote.get(writer, ()):
-            if pair.local.attributes.is_payload_protected:
-                return pair
-        return None
+        try:
+            return self._payload_pairs[writer]
+        except KeyError:
+            pairs = self._keys.by_remote.get(writer, ())
+            found = next((pair for pair in pairs if pair.local.attributes.is_payload_protected), None)
+            if len(self._payload_pairs) < _MOST_OPENERS:
+                self._payload_pairs[writer] = found
+            return found
 
     # --- what must be protected --------------------------------------------------------------------------
 

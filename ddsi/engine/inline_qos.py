@@ -20,6 +20,8 @@ __all__ = ["NUMBERS_END", "InlineQos"]
 
 _NUMBER = {True: struct.Struct("<iI"), False: struct.Struct(">iI")}
 _GUID_OCTETS = 16
+_KEY_HASH = int(ParameterId.KEY_HASH)
+_KEY_HASH_OCTETS = 16
 _COHERENCE = (ParameterId.COHERENT_SET, ParameterId.GROUP_SEQ_NUM, ParameterId.GROUP_COHERENT_SET)
 # No writer gets that far in 100,000 years at a million samples a second.  Beyond it, what we add to a peer's numbers
 # might no longer fit the wire.
@@ -44,12 +46,16 @@ class InlineQos:
         """Unknown parameters are skipped, but one that must be understood makes the sample void (RTPS 2.5 §9.6.3)."""
         if not isinstance(parameters, ParameterList):
             return _NO_INLINE_QOS
+        if len(parameters) == 1:  # the one that stands with every sample of a keyed topic whose payload is protected
+            ((pid, value),) = parameters
+            if pid == _KEY_HASH and len(value) >= _KEY_HASH_OCTETS:
+                return cls(0, bytes(value[:_KEY_HASH_OCTETS]))
         parameters.require_understood()
         status = parameters.get(ParameterId.STATUS_INFO)
         key_hash = parameters.get(ParameterId.KEY_HASH)
         inline = cls(
             status[3] if status is not None and len(status) >= 4 else 0,
-            bytes(key_hash[:16]) if key_hash is not None and len(key_hash) >= 16 else b"",
+            bytes(key_hash[:_KEY_HASH_OCTETS]) if key_hash is not None and len(key_hash) >= _KEY_HASH_OCTETS else b"",
             _identity(parameters, ParameterId.RELATED_SAMPLE_IDENTITY),
         )
         filter_info = parameters.get(ParameterId.CONTENT_FILTER_INFO)

@@ -6,11 +6,12 @@ import struct
 from dataclasses import field
 from enum import IntFlag
 
-from ..serialization.cursor import Octets, Reader
+from ..serialization.cursor import Octets
 from ..serialization.parameter_list import ParameterList
 from ..structure.dataclass import dataclass
+from ..structure.errors import MalformedMessage
 from ..structure.guid import EntityId
-from .data import encode_inline_qos, inline_qos_position
+from .data import encode_inline_qos
 from .raw_submessage import LITTLE_ENDIAN, SubmessageKind
 
 __all__ = ["DataFrag", "DataFragFlag"]
@@ -33,6 +34,10 @@ _NON_STANDARD_PAYLOAD = int(DataFragFlag.NON_STANDARD_PAYLOAD)
 _HEAD = {True: struct.Struct("<BBHHH4s4siIIHHI"), False: struct.Struct(">BBHHH4s4siIIHHI")}
 _HEAD_LENGTH = 32
 _OCTETS_TO_INLINE_QOS = 28
+_BODY = {True: struct.Struct("<HH4s4siIIHHI"), False: struct.Struct(">HH4s4siIIHHI")}
+_BODY_LENGTH = 32
+_TO_INLINE_QOS_END = 4
+"""octetsToInlineQos counts from behind itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,27 +134,28 @@ class DataFrag:
 
         Malformed: a number below 1, a run that begins or ends beyond the sample, a run that is not all there.
         """
-        little_endian = bool(flags & LITTLE_ENDIAN)
-        reader = Reader(body, little_endian=little_endian)
-        reader.skip(2)
-        rest = inline_qos_position(reader, _OCTETS_TO_INLINE_QOS)
-        reader_id, writer_id, writer_sn = reader.entity_id(), reader.entity_id(), reader.sequence_number()
-        starting_num, count, size, sample_size = reader.u32(), reader.u16(), reader.u16(), reader.u32()
+        little_endian, view = bool(flags & LITTLE_ENDIAN), memoryview(body)
+        if len(view) < _BODY_LENGTH:
+            raise _malformed(f"{len(view)} octets", 0)
+        _, to_inline_qos, reader_id, writer_id, high, low, starting_num, count, size, sample_size = _BODY[
+            little_endian
+        ].unpack_from(view)
+        writer_sn, rest = high << 32 | low, _TO_INLINE_QOS_END + to_inline_qos
+        if to_inline_qos % 4 or not _BODY_LENGTH <= rest <= len(view):
+            reason = f"octetsToInlineQos is {to_inline_qos}, {len(view) - _TO_INLINE_QOS_END} octets are left"
+            raise _malformed(reason, _TO_INLINE_QOS_END)
         if min(writer_sn, starting_num, count, size) < 1:
-            raise reader.malformed(
-                f"no change {writer_sn} has {count} fragments of {size} octets from {starting_num} on"
-            )
+            raise _malformed(f"no change {writer_sn} has {count} fragments of {size} octets from {starting_num} on")
         if (starting_num + count - 2) * size >= sample_size:
-            raise reader.malformed(f"fragment {starting_num + count - 1} of {size} octets is beyond {sample_size}")
-        reader.skip(rest - reader.position)
+            raise _malformed(f"fragment {starting_num + count - 1} of {size} octets is beyond {sample_size}")
         inline_qos = None
         if flags & _INLINE_QOS:
-            inline_qos, length = ParameterList.decode(body, little_endian=little_endian, start=rest)
-            reader.skip(length)
-        payload = reader.octets(reader.remaining)
+            inline_qos, length = ParameterList.decode(view, little_endian=little_endian, start=rest)
+            rest += length
+        payload = view[rest:]
         data_frag = cls(
-            reader_id,
-            writer_id,
+            EntityId(reader_id),
+            EntityId(writer_id),
             writer_sn,
             starting_num,
             count,
@@ -161,5 +167,9 @@ class DataFrag:
             bool(flags & _NON_STANDARD_PAYLOAD),
         )
         if len(payload) < data_frag.run_length:
-            raise reader.malformed(f"{len(payload)} octets of {data_frag.run_length} are there")
+            raise _malformed(f"{len(payload)} octets of {data_frag.run_length} are there", rest)
         return data_frag
+
+
+def _malformed(reason: str, offset: int = _BODY_LENGTH) -> MalformedMessage:
+    return MalformedMessage(reason, element="DATA_FRAG", offset=offset)

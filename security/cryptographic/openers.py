@@ -1,6 +1,7 @@
-"""The short ways of protected submessages and payloads: what is protected as it was before is opened as it was before.
+"""The short ways of what is protected as it was before: it is opened as it was before.
 
-DDS-Security 1.1 §9.5.3.3 (decode_datawriter_submessage, decode_datareader_submessage, decode_serialized_payload).
+DDS-Security 1.1 §9.5.3.3 (decode_rtps_message, decode_datawriter_submessage, decode_datareader_submessage,
+decode_serialized_payload).
 Under which key and in which session something was protected its first octets tell, and nearly all of one sender begin
 with the same ones.  :mod:`.opening` and :mod:`.payload` are the general ways, which open the first; tests hold each
 pair against each other.
@@ -11,78 +12,80 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from functools import lru_cache
+from hmac import compare_digest
 from typing import Final
 
 from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
-from ddsi.spi import Octets
+from ddsi.spi import Octets, Outcome
 
 from .aes_gcm import LARGE, Scratch, decrypt_sealed
-from .envelope import ENVELOPE_KINDS, HEAD, SUBMESSAGE, body_head
+from .envelope import ENVELOPE_KINDS, HEAD, MESSAGE, SUBMESSAGE, Envelope, body_head
+from .opening import as_message
 from .received_keys import KeyRing, ReceivedSession
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
 
-__all__ = ["PayloadOpener", "SubmessageOpener", "payload_opener", "submessage_opener"]
+__all__ = [
+    "MessageOpener",
+    "PayloadOpener",
+    "SubmessageOpener",
+    "message_opener",
+    "payload_opener",
+    "submessage_opener",
+]
 
+_RTPS_HEADER: Final = 20
 _NONCE_AT: Final = 12
 _BODY_AT: Final = 24
 _CONTENT_AT: Final = 32
 _FOOT: Final = 24
-"""SEC_POSTFIX with its header, without receiver-specific MACs."""
-_POSTFIX_HEAD: Final = SUBMESSAGE.postfix_head
+"""The postfix with its header, without receiver-specific MACs."""
 _NO_MACS: Final = bytes(4)
 _LEAST: Final = _CONTENT_AT + 4 + _FOOT
-"""Octets around the content of a submessage, and its header."""
-
+"""Octets around the content of an encrypted submessage, and its header."""
 
 _PAYLOAD_NONCE_AT: Final = 8
 _PAYLOAD_CONTENT_AT: Final = HEADER_LENGTH + 4
 _PAYLOAD_FOOT: Final = MAC_LENGTH + len(_NO_MACS)
 
 
-class SubmessageOpener:
-    """For submessages that begin with the same 16 octets: encrypted, for all receivers alike, in one session."""
+class _Encrypted:
+    """Envelopes that begin with the same 16 octets: encrypted, for all receivers alike, in one session."""
 
-    __slots__ = ("_aead", "_decrypt", "_scratch")
+    __slots__ = ("_aead", "_decrypt", "_postfix_head", "_scratch")
 
-    def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
+    def __init__(self, envelope: Envelope, aead: AESGCM, scratch: Scratch) -> None:
+        self._postfix_head = envelope.postfix_head
         self._aead = aead
         self._decrypt = aead.decrypt
         self._scratch = scratch
 
-    def open(self, octets: Octets) -> Octets | None:
-        """The one submessage in ``octets``, little-endian and with its length; else None, and they are as they were.
+    def content(self, octets: Octets) -> Octets | None:
+        """What lies in the envelope; else None, and the octets are as they were.
 
         None also where they were altered: the general way says in what.
         """
         length = len(octets)
         if length >= LARGE or not isinstance(octets, bytes):
-            plain = self._open_large(memoryview(octets))
-            if plain is None:
-                return None
-        elif length < _LEAST:
+            return self._large_content(memoryview(octets))
+        if length < _LEAST:
             return None
-        else:
-            take_apart, expected_head = _layout(length)
-            nonce, head, cipher_text, postfix_head, mac, count = take_apart(octets)
-            if head != expected_head or postfix_head != _POSTFIX_HEAD or count != _NO_MACS:
-                return None
-            try:
-                plain = self._decrypt(nonce, cipher_text + mac, None)
-            except InvalidTag:
-                return None
-        kind, flags, following = HEAD.unpack_from(plain)
-        if not flags & 1 or following != length - _LEAST or kind in ENVELOPE_KINDS:
+        take_apart, expected_head = _layout(length)
+        nonce, head, cipher_text, postfix_head, mac, count = take_apart(octets)
+        if head != expected_head or postfix_head != self._postfix_head or count != _NO_MACS:
             return None
-        return plain
+        try:
+            return self._decrypt(nonce, cipher_text + mac, None)
+        except InvalidTag:
+            return None
 
-    def _open_large(self, octets: memoryview) -> Octets | None:
+    def _large_content(self, octets: memoryview) -> Octets | None:
         """Without copying, where ``octets`` can be written to: the MAC goes for a while to where AES-GCM wants it."""
         length = len(octets)
         foot = bytes(octets[-_FOOT:])
         mac = foot[4 : 4 + MAC_LENGTH]
-        if length < _LEAST or length & 3 or foot != _POSTFIX_HEAD + mac + _NO_MACS:
+        if length < _LEAST or length & 3 or foot != self._postfix_head + mac + _NO_MACS:
             return None
         if octets[_BODY_AT:_CONTENT_AT] != body_head(length - _CONTENT_AT - _FOOT):
             return None
@@ -107,6 +110,59 @@ def _layout(length: int) -> tuple[Callable[[bytes], tuple[bytes, ...]], bytes]:
     content = length - _CONTENT_AT - _FOOT
     parts = struct.Struct(f"{_NONCE_AT}x12s8s{content}s4s{MAC_LENGTH}s4s")
     return parts.unpack, b"" if length & 3 else body_head(content)
+
+
+class _Signed:
+    """The same of envelopes that are signed."""
+
+    __slots__ = ("_encrypt", "_postfix_head")
+
+    def __init__(self, envelope: Envelope, aead: AESGCM) -> None:
+        self._postfix_head = envelope.postfix_head
+        self._encrypt = aead.encrypt
+
+    def content(self, octets: Octets) -> Octets | None:
+        """As :meth:`_Encrypted.content`; a part of ``octets``, which are not copied where they are a view."""
+        content, foot = octets[_BODY_AT:-_FOOT], octets[-_FOOT:]
+        if not len(content) or foot[:4] != self._postfix_head or foot[-4:] != _NO_MACS:
+            return None
+        mac = self._encrypt(bytes(octets[_NONCE_AT:_BODY_AT]), b"", content)
+        return content if compare_digest(mac, foot[4:-4]) else None
+
+
+class SubmessageOpener(_Encrypted):
+    """For submessages."""
+
+    __slots__ = ()
+
+    def open(self, octets: Octets) -> Octets | None:
+        """The one submessage in ``octets``, little-endian and with its length; else None, and they are as they were."""
+        plain = self.content(octets)
+        if plain is None:
+            return None
+        kind, flags, following = HEAD.unpack_from(plain)
+        if not flags & 1 or following != len(octets) - _LEAST or kind in ENVELOPE_KINDS:
+            return None
+        return plain
+
+
+class MessageOpener:
+    """For messages that follow their header with the same 16 octets, and end with SRTPS_POSTFIX."""
+
+    __slots__ = ("_content",)
+
+    def __init__(self, envelopes: _Encrypted | _Signed) -> None:
+        self._content = envelopes.content
+
+    def open(self, octets: Octets) -> Octets | None:
+        """The message, with its header; else None, and ``octets`` are as they were."""
+        if len(octets) < LARGE:
+            octets = bytes(octets)
+        plain = self._content(octets[_RTPS_HEADER:])
+        if plain is None:
+            return None
+        message = as_message(plain, octets)
+        return None if isinstance(message, Outcome) else message
 
 
 class PayloadOpener:
@@ -134,29 +190,42 @@ class PayloadOpener:
             return None
 
 
-def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> SubmessageOpener | None:
+def message_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> MessageOpener | None:
     """Opens what begins as ``octets``, which were opened with this ring; None where the usual form is not expected.
 
     It holds until the ring changes.
     """
-    session = _session(octets[4:16], ring, expected)
-    if session is None or octets[:4] != SUBMESSAGE.prefix_head:
+    at = _RTPS_HEADER + HEAD.size
+    session = _session(octets[at : at + 12], ring, expected)
+    if session is None or expected is None or octets[_RTPS_HEADER:at] != MESSAGE.prefix_head:
         return None
-    return SubmessageOpener(session.aead, ring.scratch)
+    if expected.encrypted:
+        return MessageOpener(_Encrypted(MESSAGE, session.aead, ring.scratch))
+    return MessageOpener(_Signed(MESSAGE, session.aead))
+
+
+def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> SubmessageOpener | None:
+    """As :func:`message_opener`, of a submessage that is encrypted."""
+    session = _session(octets[4:16], ring, expected)
+    if session is None or expected is None or not expected.encrypted or octets[:4] != SUBMESSAGE.prefix_head:
+        return None
+    return SubmessageOpener(SUBMESSAGE, session.aead, ring.scratch)
 
 
 def payload_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> PayloadOpener | None:
-    """As :func:`submessage_opener`, of a payload."""
+    """As :func:`message_opener`, of a payload that is encrypted."""
     session = _session(octets[:12], ring, expected)
-    return None if session is None else PayloadOpener(session.aead, ring.scratch)
+    if session is None or expected is None or not expected.encrypted:
+        return None
+    return PayloadOpener(session.aead, ring.scratch)
 
 
 def _session(octets: Octets, ring: KeyRing, expected: Protection | None) -> ReceivedSession | None:
-    """By transformation kind, key id and session id: of the ring's only key, if that encrypts as it should."""
+    """By transformation kind, key id and session id: of the ring's only key, if that does to octets what it should."""
     kind_octets, key_id, session_id = (bytes(octets[at : at + 4]) for at in (0, 4, 8))
     keys = ring.by_id.get(key_id)
-    if expected is None or not expected.encrypted or expected.origin_authenticated or ring.previous is not None:
+    if expected is None or expected.origin_authenticated or ring.previous is not None:
         return None
-    if keys is None or keys[0].kind_octets != kind_octets or not keys[0].encrypts:
+    if keys is None or keys[0].kind_octets != kind_octets or keys[0].encrypts is not expected.encrypted:
         return None
     return keys[0].sessions.get(session_id)

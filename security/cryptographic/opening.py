@@ -31,7 +31,7 @@ from .envelope import (
 from .received_keys import KeyRing
 from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, MAC_LENGTH, Protection
 
-__all__ = ["open_message", "open_submessage"]
+__all__ = ["as_message", "open_message", "open_submessage"]
 
 _RTPS: Final = b"RTPS"
 _INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
@@ -71,6 +71,11 @@ def open_message(octets: Octets, ring: KeyRing, expected: Protection | None) -> 
         return Rejected(str(error))
     except struct.error:
         return Rejected(_ENDS_TOO_SOON)
+    return as_message(plain, octets)
+
+
+def as_message(plain: Octets, octets: Octets) -> Octets | Outcome:
+    """The message of which ``plain`` was protected; it came in ``octets``, and both name the same participant."""
     if plain[:4] not in _INFO_SRC_HEADS or len(plain) < 24:
         return Rejected("there is no INFO_SRC at the head of what was protected")
     if plain[12:24] != octets[8:HEADER_LENGTH]:

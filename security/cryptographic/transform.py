@@ -181,6 +181,15 @@ class AesGcmGmacTransform:
         assert isinstance(sender, RemoteReader)
         return opening.open_submessage(encoded_rtps_submessage, sender.ring, sender.writer.submessage)
 
+    def message_opener(
+        self, encoded_rtps_message: Octets, sending_participant_crypto: ParticipantCryptoHandle
+    ) -> Callable[[Octets], Octets | None] | None:
+        """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.OpensAlike`."""
+        remote = sending_participant_crypto
+        assert isinstance(remote, RemoteParticipant)
+        opener = openers.message_opener(encoded_rtps_message, remote.ring, remote.local.protection)
+        return None if opener is None else opener.open
+
     def submessage_opener(
         self,
         encoded_rtps_submessage: Octets,

@@ -7,11 +7,17 @@ import struct
 import pytest
 
 from ddsi_security.cryptographic.aes_gcm import LARGE
-from ddsi_security.cryptographic.openers import SubmessageOpener, payload_opener, submessage_opener
-from ddsi_security.cryptographic.opening import open_submessage
+from ddsi_security.cryptographic.openers import (
+    MessageOpener,
+    SubmessageOpener,
+    message_opener,
+    payload_opener,
+    submessage_opener,
+)
+from ddsi_security.cryptographic.opening import open_message, open_submessage
 from ddsi_security.cryptographic.payload import decode_payload, encode_payload
 from ddsi_security.cryptographic.received_keys import KeyRing
-from ddsi_security.cryptographic.sealing import seal_submessage
+from ddsi_security.cryptographic.sealing import seal_message, seal_submessage
 from ddsi_security.cryptographic.session_keys import SendingKey
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from tests.security.cryptographic.keys import material, ring, sending_key
@@ -108,6 +114,77 @@ def test_there_is_none_for_what_is_signed() -> None:
     keys, signed = ring(of), sealed(submessage(24), sending_key(of))
     assert open_submessage(signed, keys, Protection(encrypted=False)) == submessage(24)
     assert submessage_opener(signed, keys, Protection(encrypted=False)) is None
+
+
+# --- messages --------------------------------------------------------------------------------------------------------
+
+SIGNED = Protection(encrypted=False)
+KINDS = {ENCRYPTED: TransformationKind.AES256_GCM, SIGNED: TransformationKind.AES256_GMAC}
+EITHER = pytest.mark.parametrize("expected", [ENCRYPTED, SIGNED], ids=["encrypted", "signed"])
+HEADER = b"RTPS\2\5\1\xdd" + bytes(range(12))
+
+
+def sealed_message(size: int, key: SendingKey, header: bytes = HEADER) -> bytes:
+    buffer = bytearray()
+    assert seal_message(buffer, header + submessage(size), key, ()) is None
+    return bytes(buffer)
+
+
+def message_keys(expected: Protection) -> tuple[KeyRing, SendingKey, MessageOpener]:
+    of = material(KINDS[expected])
+    keys, key = ring(of), sending_key(of)
+    first = sealed_message(24, key)
+    assert open_message(first, keys, expected) == HEADER + submessage(24)
+    opener = message_opener(first, keys, expected)
+    assert opener is not None
+    return keys, key, opener
+
+
+@EITHER
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("kind", [bytes, bytearray, lambda octets: memoryview(bytearray(octets)), memoryview])
+def test_messages_are_opened_in_the_same_session(size: int, kind: type, expected: Protection) -> None:
+    _, key, opener = message_keys(expected)
+    found = opener.open(kind(sealed_message(size, key)))
+    assert found is not None
+    assert bytes(found) == HEADER + submessage(size)
+
+
+@EITHER
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("at", [8, 19, 32, 43, 44, 48, 56, 60, -25, -24, -20, -5, -1])
+def test_altered_messages_are_left_to_the_general_way(size: int, at: int, expected: Protection) -> None:
+    """The header too, as INFO_SRC repeats it."""
+    _, key, opener = message_keys(expected)
+    altered = bytearray(sealed_message(size, key))
+    altered[at] ^= 1
+    before = bytes(altered)
+    assert opener.open(altered) is None
+    assert opener.open(before) is None
+    assert altered == before
+    for length in (0, 20, 36, 44, 68, 92, len(before) - 4):
+        assert opener.open(before[:length]) is None
+
+
+@EITHER
+def test_what_follows_the_postfix_is_left_to_the_general_way(expected: Protection) -> None:
+    keys, key, opener = message_keys(expected)
+    with_tail = sealed_message(24, key) + submessage(12)
+    assert opener.open(with_tail) is None
+    assert open_message(with_tail, keys, expected) == HEADER + submessage(24)
+
+
+@EITHER
+def test_there_is_none_for_messages_where_more_is_asked_for(expected: Protection) -> None:
+    keys, key, _ = message_keys(expected)
+    first = sealed_message(24, key)
+    other = SIGNED if expected is ENCRYPTED else ENCRYPTED
+    assert message_opener(first, keys, None) is None
+    assert message_opener(first, keys, other) is None
+    assert message_opener(first, keys, Protection(expected.encrypted, origin_authenticated=True)) is None
+    assert message_opener(first[:24] + b"\x99" * 4 + first[28:], keys, expected) is None
+    keys.replace(material(KINDS[other]))
+    assert message_opener(first, keys, expected) is None
 
 
 # --- payloads --------------------------------------------------------------------------------------------------------
