@@ -234,8 +234,8 @@ class Pump:
         try:
             self._read(sock, history)
             while not (history.has_news or lead.is_disturbed or sock.fileno() < 0):
-                await lead.wait(sock)
-                self.has_yielded()
+                if await lead.wait(sock):
+                    self.has_yielded()
                 self._read(sock, history)
         finally:
             lead.leave()
