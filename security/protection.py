@@ -90,8 +90,6 @@ class Protection:
         """By source and first octets of submessages: what opened the last of these, and whose they are."""
         self._payload_openers: dict[Guid, tuple[bytes, Opener]] = {}
         """By remote writer: how its last payload began, and what opened it."""
-        self._payload_pairs: dict[Guid, Pair | None] = {}
-        """By remote writer: who of ours reads protected payloads of it."""
         self._required: dict[bytes, int] = {}
         """What the submessages of a remote endpoint need; by its Guid, until anything about it changes."""
         self.refused = 0
@@ -104,7 +102,6 @@ class Protection:
         self._message_openers.clear()
         self._openers.clear()
         self._payload_openers.clear()
-        self._payload_pairs.clear()
 
     # --- outwards ----------------------------------------------------------------------------------------
 
@@ -304,14 +301,10 @@ class Protection:
         )
 
     def _payload_pair(self, writer: Guid) -> Pair | None:
-        try:
-            return self._payload_pairs[writer]
-        except KeyError:
-            pairs = self._keys.by_remote.get(writer, ())
-            found = next((pair for pair in pairs if pair.local.attributes.is_payload_protected), None)
-            if len(self._payload_pairs) < _MOST_OPENERS:
-                self._payload_pairs[writer] = found
-            return found
+        for pair in self._keys.by_remote.get(writer, ()):
+            if pair.local.attributes.is_payload_protected:
+                return pair
+        return None
 
     # --- what must be protected --------------------------------------------------------------------------
 
