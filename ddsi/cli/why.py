@@ -83,7 +83,8 @@ async def _with_types(participant: DomainParticipant, asked: list[str | Guid]) -
 
 def _is_well(explanation: Explanation) -> bool:
     is_cut_off = any(trouble.kind in ("unreachable", "silent") for trouble in explanation.troubles)
-    return not (explanation.mismatches or explanation.unknown or is_cut_off or _is_empty(explanation))
+    is_partial = explanation.left_out > 0
+    return not (explanation.mismatches or explanation.unknown or is_cut_off or is_partial or _is_empty(explanation))
 
 
 def _is_empty(explanation: Explanation) -> bool:
@@ -122,6 +123,10 @@ def _lines(census: Census, explanation: Explanation) -> Iterator[str]:
     bad = len(explanation.mismatches)
     fitting = count_text(explanation.matching_count, "pair")
     yield f"{fitting} of a writer and a reader fit, {bad or 'none'} {'does' if bad == 1 else 'do'} not."
+    if explanation.left_out:
+        left_out = count_text(explanation.left_out, "more pair")
+        verb = "was" if explanation.left_out == 1 else "were"
+        yield f"{left_out} {verb} not looked at: ask about one topic or endpoint (`ddsi why TOPIC`, `ddsi why GUID`)."
 
 
 def _trouble_lines(census: Census, troubles: tuple[ParticipantTrouble, ...]) -> Iterator[str]:
@@ -179,6 +184,7 @@ def _explanation_json(census: Census, explanation: Explanation) -> dict[str, obj
         "asked": list(explanation.asked),
         "complete": explanation.is_complete,
         "matching": explanation.matching_count,
+        "left_out": explanation.left_out,
         "mismatches": [_pair_json(census, pair) for pair in explanation.mismatches],
         "pairs": [
             {

@@ -84,13 +84,17 @@ class ParticipantTrouble:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """``asked``: a pattern of topics, or Guids as text; empty for everything.  ``unknown``: Guids nobody announces."""
+    """``asked``: a pattern of topics, or Guids as text; empty for everything.  ``unknown``: Guids nobody announces.
+
+    ``left_out``: how many pairs there are beyond the 100,000 that were looked at, and of which nothing is said.
+    """
 
     asked: tuple[str, ...]
     pairs: tuple[PairExplanation, ...]
     lonely: tuple[LonelyTopic, ...] = ()
     troubles: tuple[ParticipantTrouble, ...] = ()
     unknown: tuple[Guid, ...] = ()
+    left_out: int = 0
 
     @property
     def mismatches(self) -> tuple[PairExplanation, ...]:
@@ -114,11 +118,24 @@ def explained_pairs(
     readers: Iterable[DiscoveredReaderData],
     judge: Judge,
     pattern: str = "",
-) -> tuple[PairExplanation, ...]:
+    *,
+    of: Guid | None = None,
+) -> tuple[tuple[PairExplanation, ...], int]:
     """Every writer with every reader of its topic, and with those of a topic that was probably meant.
 
     That is one that differs by case, blanks or the prefix of ROS 2, where one of the two topics lacks its other half.
+    ``of``: the pairs of this endpoint alone.  Returns the first MOST_EXPLAINED, and how many more there are.
     """
+    groups = list(_meeting(writers, readers, pattern, of))
+    pairs = (judge(writer, reader) for offering, asking in groups for writer in offering for reader in asking)
+    count = sum(len(offering) * len(asking) for offering, asking in groups)
+    return tuple(islice(pairs, MOST_EXPLAINED)), max(0, count - MOST_EXPLAINED)
+
+
+def _meeting(
+    writers: Iterable[DiscoveredWriterData], readers: Iterable[DiscoveredReaderData], pattern: str, of: Guid | None
+) -> Iterator[tuple[list[DiscoveredWriterData], list[DiscoveredReaderData]]]:
+    """Of each topic, and of each two that were probably meant to be one: who writes, and who reads."""
     offered: dict[str, list[DiscoveredWriterData]] = {}
     requested: dict[str, list[DiscoveredReaderData]] = {}
     for writer in writers:
@@ -128,17 +145,17 @@ def explained_pairs(
     folded: dict[str, list[str]] = {}
     for name in requested:
         folded.setdefault(_folded(name), []).append(name)
-
-    def pairs() -> Iterator[PairExplanation]:
-        for topic in offered:
-            for other in folded.get(_folded(topic), ()):
-                is_lonely = topic not in requested or other not in offered
-                if (topic == other or is_lonely) and (fits(pattern, topic) or fits(pattern, other)):
-                    for writer in offered[topic]:
-                        for reader in requested[other]:
-                            yield judge(writer, reader)
-
-    return tuple(islice(pairs(), MOST_EXPLAINED))
+    for topic, offering in offered.items():
+        for other in folded.get(_folded(topic), ()):
+            is_lonely = topic not in requested or other not in offered
+            if (topic == other or is_lonely) and (fits(pattern, topic) or fits(pattern, other)):
+                asking = requested[other]
+                if of is None:
+                    yield offering, asking
+                elif of.entity_id.is_writer:
+                    yield [data for data in offering if data.guid == of], asking
+                else:
+                    yield offering, [data for data in asking if data.guid == of]
 
 
 def fits(pattern: str, topic: str) -> bool:

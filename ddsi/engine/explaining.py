@@ -55,12 +55,13 @@ _DROPS = {
 def explain(engine: Participant, topic: str, now: float) -> Explanation:
     """All pairs of the topic (its name, or a shell pattern; empty for all topics), and what else stands in the way."""
     writers, readers = _writers(engine), _readers(engine)
-    pairs = _Judge(engine, now)
+    pairs, left_out = explained_pairs(writers, readers, _Judge(engine, now), topic)
     return Explanation(
         asked=(topic,) if topic else (),
-        pairs=explained_pairs(writers, readers, pairs, topic),
+        pairs=pairs,
         lonely=lonely_topics(writers, readers, topic),
         troubles=tuple(_troubles(engine)),
+        left_out=left_out,
     )
 
 
@@ -71,17 +72,18 @@ def explain_endpoints(engine: Participant, guids: tuple[Guid, ...], now: float) 
     readers = {data.guid: data for data in _readers(engine)}
     unknown = tuple(guid for guid in guids if guid not in writers and guid not in readers)
     judge = _Judge(engine, now)
+    left_out = 0
     if len(guids) == 1:
-        pairs = explained_pairs(writers.values(), readers.values(), judge)
-        chosen = tuple(pair for pair in pairs if guids[0] in (pair.writer.guid, pair.reader.guid))
+        pairs, left_out = explained_pairs(writers.values(), readers.values(), judge, of=guids[0])
     else:
-        chosen = tuple(
+        pairs = tuple(
             judge(writers[one], readers[other])
             for one in guids
             for other in guids
             if one in writers and other in readers
         )
-    return Explanation(asked=tuple(map(str, guids)), pairs=chosen, troubles=tuple(_troubles(engine)), unknown=unknown)
+    asked, troubles = tuple(map(str, guids)), tuple(_troubles(engine))
+    return Explanation(asked, pairs, troubles=troubles, unknown=unknown, left_out=left_out)
 
 
 def judged_pair(

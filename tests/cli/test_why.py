@@ -34,11 +34,9 @@ def _explained(*endpoints: Endpoint, topic: str = "") -> Explanation:
     def judge(one: DiscoveredWriterData, other: DiscoveredReaderData) -> PairExplanation:
         return PairExplanation(one, other, _disagreements(one, other))
 
-    return Explanation(
-        (topic,) if topic else (),
-        explained_pairs(writers, readers, judge, topic),
-        lonely_topics(writers, readers, topic),
-    )
+    pairs, left_out = explained_pairs(writers, readers, judge, topic)
+    lonely = lonely_topics(writers, readers, topic)
+    return Explanation((topic,) if topic else (), pairs, lonely, left_out=left_out)
 
 
 def _text(*endpoints: Endpoint, topic: str = "") -> list[str]:
@@ -203,10 +201,29 @@ def test_topics_that_have_their_own_other_half_are_left_alone() -> None:
     assert [pair.is_matching for pair in _explained(*seen).pairs] == [True, True]
 
 
-def test_pairs_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pairs_are_bounded_and_what_was_left_out_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the value, the text, the JSON and the status: nobody shall take silence for a match."""
     monkeypatch.setattr(explanation, "MOST_EXPLAINED", 10)
-    many: list[Endpoint] = [*(writer(number=n) for n in range(1, 100)), *(reader(number=n) for n in range(1, 100))]
-    assert len(_explained(*many).pairs) == 10
+    many: list[Endpoint] = [*(writer(number=n) for n in range(1, 5)), *(reader(number=n) for n in range(1, 5))]
+    found = _explained(*many)
+    assert (len(found.pairs), found.left_out) == (10, 6)
+    assert list(why._lines(census(*many), found))[-1].startswith("6 more pairs were not looked at: ask about one topic")
+    assert why._explanation_json(census(*many), found)["left_out"] == 6
+    assert not why._is_well(found)
+    whole = _explained(*many[:2], *many[4:])
+    assert (len(whole.pairs), whole.left_out) == (8, 0)
+    assert list(why._lines(census(), whole))[-1] == "8 pairs of a writer and a reader fit, none do not."
+    assert why._is_well(whole)
+
+
+def test_the_pairs_of_one_endpoint_are_found_however_many_others_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(explanation, "MOST_EXPLAINED", 10)
+    writers = [writer(number=n) for n in range(1, 9)]
+    readers = [reader(number=n) for n in range(1, 9)]
+    for of in (writers[-1].guid, readers[-1].guid):
+        pairs, left_out = explained_pairs(writers, readers, PairExplanation, of=of)
+        assert (len(pairs), left_out) == (8, 0)
+        assert all(of in (pair.writer.guid, pair.reader.guid) for pair in pairs)
 
 
 def test_pairs_with_the_same_reasons_are_told_of_together() -> None:
