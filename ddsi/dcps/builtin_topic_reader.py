@@ -15,6 +15,7 @@ from ..structure.cache_change import CacheChange
 from ..structure.errors import BadParameter
 from ..structure.guid import Guid
 from ..structure.sample_info import SampleInfo
+from .entity import check_participant
 from .sample import Sample
 from .sample_reader import SampleReader
 
@@ -61,6 +62,7 @@ class BuiltinTopicReader(SampleReader[T]):
             raise BadParameter(
                 f"a BuiltinTopicReader reads {', '.join(known.__name__ for known in _KINDS)}, not {kind!r}"
             )
+        check_participant(participant)
         super().__init__(participant, None)
         self._topic_name: str = kind.TOPIC_NAME
         self._reader: LocalBuiltinTopicReader = self._pump.engine.builtin_readers.create(kind, self._pump.now())

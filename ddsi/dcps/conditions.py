@@ -14,7 +14,13 @@ from ..behavior.content_filter import ContentFilter
 from ..behavior.reader_history_cache import SampleSelector
 from ..structure.discovered import ContentFilterProperty
 from ..structure.errors import BadParameter, PreconditionNotMet
-from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo
+from ..structure.sample_info import (
+    ANY_INSTANCE_STATE,
+    ANY_SAMPLE_STATE,
+    ANY_VIEW_STATE,
+    SampleInfo,
+    check_states,
+)
 from .entity import Entity
 
 if TYPE_CHECKING:
@@ -120,6 +126,7 @@ class ReadCondition(Condition):
         found = getattr(reader, "_entity", reader)  # of `ddsi.blocking` and `ddsi.aio`: what it stands for
         if found is not None and not hasattr(found, "_history"):
             raise BadParameter(f"the reader of a condition is a DataReader or a BuiltinTopicReader, not {reader!r}")
+        check_states(sample_states, view_states, instance_states)
         self._reader: SampleReader[Any] | None = found
         self.sample_states = sample_states
         self.view_states = view_states

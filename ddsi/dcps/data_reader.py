@@ -33,7 +33,7 @@ from ..structure.status import (
 from ..xtypes.type_support import TypeSupport
 from .content_filtered_topic import ContentFilteredTopic
 from .endpoint import Endpoint, QosPlan
-from .entity import deadline_scope
+from .entity import check_count, deadline_scope
 from .groups import Subscriber, check_family
 from .sample import Sample
 from .sample_reader import SampleReader
@@ -164,6 +164,7 @@ class DataReader(SampleReader[T], Endpoint):
 
     async def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
         """Until at least ``count`` writers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        check_count("count", count)
         await self._participant._wait_until(
             self, lambda: self._reader.matched.current_count >= count, timeout,
             f"reader of {self._topic.name!r} has not matched {count} writer(s)",

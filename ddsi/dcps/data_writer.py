@@ -28,7 +28,7 @@ from ..structure.status import (
 from ..structure.time import Time
 from .content_filtered_topic import filter_compiler
 from .endpoint import Endpoint, QosPlan
-from .entity import deadline_scope
+from .entity import check_count, deadline_scope
 from .groups import Publisher, check_family
 from .topic import Topic
 
@@ -234,21 +234,21 @@ class DataWriter(Endpoint, Generic[T]):
     def _say_farewell(self) -> None:
         """Unregister all instances; WriterDataLifecycle decides that this disposes them.  DDS 1.4 §2.2.3.21.
 
-        Where it does not, the end of the writer, which all readers hear of, says as much.
+        Where it does not, the end of the writer, which all readers hear of, says as much.  What was kept back, as
+        publications are suspended, is sent.
         """
-        instances, self._instances = self._instances, {}
-        if (
-            not self._is_keyed
-            or not self._endpoint_qos.writer_data_lifecycle.autodispose_unregistered_instances
-            or self._pump.is_closed
-        ):
+        if self._pump.is_closed:
             return
-        now = self._pump.now()
-        for key in instances:
-            self._pump.engine.write(
-                self._writer, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED,
-                self._serialize_key(self._support.sample_from_key(key)), key, now, key_hash=self._key_hash(key),
-            )  # fmt: skip
+        engine, now = self._pump.engine, self._pump.now()
+        instances, self._instances = self._instances, {}
+        if self._is_keyed and self._endpoint_qos.writer_data_lifecycle.autodispose_unregistered_instances:
+            for key in instances:
+                engine.write(
+                    self._writer, ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED,
+                    self._serialize_key(self._support.sample_from_key(key)), key, now, key_hash=self._key_hash(key),
+                )  # fmt: skip
+        if self._writer.behavior.is_suspended:
+            engine.presentation.resume(self._writer, now)
 
     def _key_hash(self, key: bytes) -> bytes:
         """Where the key is protected the hash is a digest, and goes with samples too: nobody can compute it before
@@ -321,6 +321,7 @@ class DataWriter(Endpoint, Generic[T]):
 
     async def wait_for_matched(self, count: int = 1, timeout: float | None = None) -> None:
         """Until at least ``count`` readers are matched.  Raises DdsTimeout after ``timeout`` seconds."""
+        check_count("count", count)
         await self._participant._wait_until(
             self, lambda: self._writer.matched.current_count >= count, timeout,
             f"writer of {self._topic.name!r} has not matched {count} reader(s)",
@@ -391,6 +392,8 @@ def _with_representation(qos: EndpointQos, possible: tuple[DataRepresentationId,
 def _ticks(timestamp: Timestamp) -> int:
     """A source timestamp in ticks.  Raises BadParameter."""
     seconds = timestamp.timestamp() if isinstance(timestamp, datetime) else timestamp
+    if not isinstance(seconds, (int, float)):
+        raise BadParameter(f"timestamp is a number of seconds since 1970 or a datetime, not {timestamp!r}")
     try:
         return Time.from_seconds(seconds).ticks
     except (ValueError, TypeError) as error:

@@ -27,7 +27,7 @@ from ..structure.status import DataAvailable, DataOnReaders, Status
 if TYPE_CHECKING:
     from .participant import DomainParticipant
 
-__all__ = ["Entity", "EventStream", "Parent", "deadline_scope"]
+__all__ = ["Entity", "EventStream", "Parent", "check_count", "check_participant", "deadline_scope"]
 
 _S = TypeVar("_S")
 _MAX_EVENTS = 1024
@@ -301,6 +301,18 @@ def _accumulated(before: Status, status: Status) -> Status:
 
 def _unchanged(status: Any) -> Any:
     return replace(status, **dict.fromkeys(_changes_of(type(status)), 0))
+
+
+def check_participant(participant: object) -> None:
+    """Is it one, as what belongs to no group needs?  Raises BadParameter."""
+    if not isinstance(participant, Parent) or participant.participant is not participant:
+        raise BadParameter(f"the first argument is a ddsi.DomainParticipant, not {participant!r}")
+
+
+def check_count(name: str, value: object) -> None:
+    """A number of things, 0 or more.  Raises BadParameter."""
+    if not isinstance(value, int) or value < 0:
+        raise BadParameter(f"{name} is a whole number, 0 or more, not {value!r}")
 
 
 def deadline_scope(timeout: float | None) -> trio.CancelScope:

@@ -21,7 +21,7 @@ from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VI
 from ..structure.status import DataAvailable, DataOnReaders
 from .conditions import ReadCondition
 from .endpoint import Endpoint, follow_all
-from .entity import Entity, Parent, deadline_scope
+from .entity import Entity, Parent, check_participant, deadline_scope
 from .sample_reader import SampleReader
 from .topic import Topic
 
@@ -43,6 +43,7 @@ _UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
 class _Group(Parent):
     def __init__(self, participant: DomainParticipant, qos: Qos | None = None) -> None:
         super().__init__(qos)
+        check_participant(participant)
         self._pump = participant._running_pump()
         self._participant = participant
         self._is_enabled = participant._enables_members
@@ -146,13 +147,10 @@ class Publisher(_Group):
         self._check_open()
         if not self._is_suspended:
             raise PreconditionNotMet(f"{self!r}: publications are not suspended; call suspend_publications() before")
-        self._resume()
-        self._pump.settle()
-
-    def _resume(self) -> None:
         self._is_suspended = False
         for writer in self._writers():
             self._pump.engine.presentation.resume(writer, self._pump.now())
+        self._pump.settle()
 
     async def wait_for_acknowledgments(self, timeout: float | None = None) -> None:
         """Until every matched reliable reader has all that the publisher's writers wrote so far.
@@ -168,11 +166,6 @@ class Publisher(_Group):
                     self._check_open()  # a writer that has been closed is not waited for
             return
         raise DdsTimeout(f"{self!r}: not all of its readers have acknowledged all after {timeout} s")
-
-    def _on_close(self) -> None:
-        if self._is_suspended:  # what was written shall not be lost by that
-            self._participant._when_running(lambda pump: self._resume())
-        super()._on_close()
 
     def _writers(self) -> list[LocalWriter]:
         endpoints = [member._local() for member in self._members if isinstance(member, Endpoint)]

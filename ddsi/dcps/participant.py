@@ -87,6 +87,8 @@ class DomainParticipant(Parent):
         super().__init__(qos)
         if not isinstance(domain_id, int) or not 0 <= domain_id <= _HIGHEST_DOMAIN:
             raise BadParameter(f"a domain id is a whole number from 0 to {_HIGHEST_DOMAIN}, not {domain_id!r}")
+        if config is not None and not isinstance(config, Config):
+            raise BadParameter(f"DomainParticipant: config is a ddsi.Config(...), not {config!r}")
         self._domain_id = domain_id
         self._config = config if config is not None else load_config(domain_id)
         self._trace = trace
@@ -122,6 +124,7 @@ class DomainParticipant(Parent):
     @trio.lowlevel.enable_ki_protection
     async def __aenter__(self) -> Self:
         self._check_open()
+        self._check_in_trio()
         if self._pump is not None:
             raise PreconditionNotMet(f"{self!r} was entered before; a DomainParticipant is entered once, make another")
         await trio.lowlevel.checkpoint()
@@ -135,6 +138,16 @@ class DomainParticipant(Parent):
             self.close()
             raise
         return self
+
+    if not TYPE_CHECKING:  # type checkers refuse a plain `with` by themselves
+
+        def __enter__(self):
+            raise PreconditionNotMet(
+                f"{self!r} is entered by `async with`; `with` is for DomainParticipant of ddsi.blocking"
+            )
+
+        def __exit__(self, *error):
+            """Never called; Python looks for it before ``__enter__``."""
 
     @trio.lowlevel.enable_ki_protection
     async def __aexit__(
@@ -342,6 +355,15 @@ class DomainParticipant(Parent):
         pump.settle()
 
     # --- inside ------------------------------------------------------------------------------------------
+
+    def _check_in_trio(self) -> None:
+        try:
+            trio.lowlevel.current_task()
+        except RuntimeError:
+            raise PreconditionNotMet(
+                f"{self!r} lives in trio, which does not run here: start the program by `trio.run(main)`, or take "
+                "DomainParticipant of ddsi.aio for asyncio, of ddsi.blocking for a plain script or thread"
+            ) from None
 
     def _running_pump(self) -> Pump:
         if self._is_closed:

@@ -25,6 +25,7 @@ from ..structure.qos_policies import Transient
 from ..structure.time import Time
 from ..xtypes.type_support import TypeSupport, type_support
 from .durable_topic import DurableTopic
+from .entity import check_participant
 from .lifetime import Lifetime
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class PersistenceService:
 
         Raises BadParameter, naming the file, where ``path`` is no store of a service, or another process has it open.
         """
+        check_participant(participant)
         participant._running_pump()
         self._participant = participant
         self._patterns = topics

@@ -13,12 +13,20 @@ import trio
 
 from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
 from ..structure.cache_change import CacheChange
+from ..structure.errors import BadParameter, PreconditionNotMet
 from ..structure.qos import Qos
-from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleInfo, SampleState
+from ..structure.sample_info import (
+    ANY_INSTANCE_STATE,
+    ANY_SAMPLE_STATE,
+    ANY_VIEW_STATE,
+    SampleInfo,
+    SampleState,
+    check_states,
+)
 from ..structure.status import DataAvailable
 from ..transport import Pump
 from .conditions import ReadCondition
-from .entity import Entity, EventStream
+from .entity import Entity, EventStream, check_count
 from .sample import Sample
 
 if TYPE_CHECKING:
@@ -64,6 +72,13 @@ class SampleReader(Entity, Generic[T]):
         return stream
 
     # --- reading -----------------------------------------------------------------------------------------
+
+    if not TYPE_CHECKING:  # type checkers refuse a plain `for` by themselves
+
+        def __iter__(self):
+            raise PreconditionNotMet(
+                f"{self!r} is iterated by `async for`; `for` is for ddsi.blocking, and for what take() returns"
+            )
 
     def __aiter__(self) -> Self:
         return self
@@ -206,6 +221,8 @@ class SampleReader(Entity, Generic[T]):
     def _begin_reading(self, max_samples: int | None) -> int | None:
         """May the application look now, and at how many samples at most?"""
         self._check_enabled()
+        if max_samples is not None:
+            check_count("max_samples", max_samples)
         return max_samples
 
     def _check_iterable(self) -> None:
@@ -260,7 +277,10 @@ class SampleReader(Entity, Generic[T]):
         self, condition: ReadCondition | None, sample_states: int, view_states: int, instance_states: int
     ) -> tuple[dict[str, int], SampleSelector | None]:
         selector: SampleSelector | None = None
+        check_states(sample_states, view_states, instance_states)
         if condition is not None:
+            if not isinstance(condition, ReadCondition):
+                raise BadParameter(f"condition is a ddsi.ReadCondition or QueryCondition, not {condition!r}")
             sample_states &= condition.sample_states
             view_states &= condition.view_states
             instance_states &= condition.instance_states

@@ -10,7 +10,7 @@ from ..structure.qos_changes import check_changeable
 from ..structure.status import InconsistentTopic
 from ..xtypes.type_support import type_support
 from .endpoint import follow_all
-from .topic_description import TopicDescription
+from .topic_description import TopicDescription, check_topic_name
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
@@ -31,6 +31,7 @@ class Topic(TopicDescription[T]):
 
     def __init__(self, participant: DomainParticipant, name: str, type_: type[T], qos: Qos | None = None) -> None:
         """``name``: 1 to 255 octets of UTF-8.  Raises BadParameter, also when ``type_`` cannot be a topic's type."""
+        check_topic_name(name)  # first: where name and type are exchanged, both are wrong, and this says which is which
         super().__init__(participant, name, type_support(type_), qos)
         self._is_enabled = participant._enables_members
         self._inconsistent_count = 0

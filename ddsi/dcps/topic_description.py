@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from ..structure.errors import BadParameter
 from ..structure.qos import Qos
 from ..xtypes.type_support import TypeSupport
-from .entity import Entity
+from .entity import Entity, check_participant
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
 
-__all__ = ["TopicDescription"]
+__all__ = ["TopicDescription", "check_topic_name"]
 
 T = TypeVar("T")
 _MAX_NAME_OCTETS = 255
@@ -24,8 +24,8 @@ class TopicDescription(Entity, Generic[T]):
     def __init__(self, participant: DomainParticipant, name: str, support: TypeSupport[T], qos: Qos | None) -> None:
         """``name``: 1 to 255 octets of UTF-8.  The participant adopts it when it is made, which is not yet."""
         super().__init__(qos)
-        if not isinstance(name, str) or not 1 <= len(name.encode()) <= _MAX_NAME_OCTETS or "\0" in name:
-            raise BadParameter(f"a topic's name is a str of 1 to 255 octets without NUL, not {name!r}")
+        check_topic_name(name)
+        check_participant(participant)
         participant._running_pump()
         self._participant = participant
         self._name = name
@@ -53,3 +53,9 @@ class TopicDescription(Entity, Generic[T]):
 
     def _on_close(self) -> None:
         self._participant._disown(self)
+
+
+def check_topic_name(name: object) -> None:
+    """Raises BadParameter."""
+    if not isinstance(name, str) or not 1 <= len(name.encode()) <= _MAX_NAME_OCTETS or "\0" in name:
+        raise BadParameter(f"a topic's name is a str of 1 to 255 octets without NUL, not {name!r}")

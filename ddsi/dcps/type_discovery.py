@@ -14,6 +14,7 @@ import trio
 from ..structure.discovered import DiscoveredReaderData, DiscoveredWriterData
 from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from .entity import deadline_scope
+from .topic_description import check_topic_name
 from .type_access import AnnouncedEndpoint, information_of_endpoint
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ _GRACE_S = 2.0
 
 async def find_type(participant: DomainParticipant, topic_name: str, timeout: float | None) -> type[Any]:
     """See :meth:`DomainParticipant.discover_type`."""
+    check_topic_name(topic_name)
     tried: set[tuple[bytes, bytes]] = set()
     reasons: dict[str, None] = {}  # in order, each once
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntFlag
 from typing import TYPE_CHECKING
 
+from .errors import BadParameter
 from .guid import Guid
 from .time import TICKS_PER_SECOND, Time
 
@@ -19,24 +20,35 @@ __all__ = [
     "SampleInfo",
     "SampleState",
     "ViewState",
+    "check_states",
 ]
 
 
-class SampleState(IntFlag):
+class _State(IntFlag):
+    """A mask that is printed by its names, as ``ALIVE``; as a number it would tell nobody anything."""
+
+    def __str__(self) -> str:
+        return self.name or "none"
+
+    def __format__(self, specification: str) -> str:
+        return format(str(self), specification)
+
+
+class SampleState(_State):
     """Was this sample read before?"""
 
     READ = 1
     NOT_READ = 2
 
 
-class ViewState(IntFlag):
+class ViewState(_State):
     """Is this the first access to the instance since it became alive?"""
 
     NEW = 1
     NOT_NEW = 2
 
 
-class InstanceState(IntFlag):
+class InstanceState(_State):
     ALIVE = 1
     NOT_ALIVE_DISPOSED = 2
     NOT_ALIVE_NO_WRITERS = 4
@@ -112,3 +124,11 @@ class SampleInfo:
             f"<SampleInfo {self.sample_state.name} {self.view_state.name} {self.instance_state.name}{valid} "
             f"from {self.publication_handle}>"
         )
+
+
+def check_states(sample_states: object, view_states: object, instance_states: object) -> None:
+    """Are these masks?  Raises BadParameter."""
+    for kind, states in ((SampleState, sample_states), (ViewState, view_states), (InstanceState, instance_states)):
+        if not isinstance(states, int):
+            names = ", ".join(f"ddsi.{kind.__name__}.{state.name}" for state in kind)
+            raise BadParameter(f"states are {names}, or several of them with | between, not {states!r}")

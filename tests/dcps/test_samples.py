@@ -123,3 +123,10 @@ async def test_two_writers_of_one_instance(domain: int) -> None:
         await other.unregister(Shape("RED"))
         (end,) = p.reader.take()
         assert end.info.instance_state is ddsi.InstanceState.NOT_ALIVE_NO_WRITERS
+
+
+def test_states_are_printed_by_their_names() -> None:
+    assert str(ddsi.InstanceState.ALIVE) == "ALIVE"
+    assert f"{ddsi.InstanceState.NOT_ALIVE_NO_WRITERS | ddsi.InstanceState.NOT_ALIVE_DISPOSED:>12}" == "   NOT_ALIVE"
+    assert str(ddsi.SampleState.READ | ddsi.SampleState.NOT_READ) == "READ|NOT_READ"
+    assert str(ddsi.ViewState(0)) == "none"
