@@ -1,7 +1,7 @@
 """Census: who was seen in a domain, with all endpoints, and who of them fits whom.
 
 Made from what discovery (RTPS 2.5 §8.5) has brought so far.  Whom a remote endpoint really matched, only its own
-participant knows; what is said here follows from what both sides announce, judged as our own endpoints judge.
+participant knows; what is said here follows from what both sides announce, as ``ddsi why`` explains it.
 """
 
 from __future__ import annotations
@@ -9,41 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from itertools import islice
 from typing import Literal
 
 from ..dcps import DomainParticipant
-from ..discovery.matching import MatchRefusal, judge
-from ..structure.discovered import (
-    DiscoveredEndpointData,
-    DiscoveredParticipantData,
-    DiscoveredReaderData,
-    DiscoveredWriterData,
-)
+from ..discovery.explanation import PairExplanation
+from ..structure.discovered import DiscoveredEndpointData, DiscoveredParticipantData, DiscoveredWriterData
 from ..structure.guid import Guid, GuidPrefix
 from ..structure.qos_policies import Property
 from ..structure.vendor import vendor_name
 
-__all__ = [
-    "MOST_PAIRS",
-    "Census",
-    "EndpointKind",
-    "Pair",
-    "SeenEndpoint",
-    "SeenParticipant",
-    "Selection",
-    "take_census",
-]
+__all__ = ["Census", "EndpointKind", "SeenEndpoint", "SeenParticipant", "Selection", "take_census"]
 
 EndpointKind = Literal["writer", "reader"]
 
 # How vendors announce host, process name and process id: Cyclone DDS, Fast DDS, RTI Connext.
 _HOST_PROPERTIES = ("__Hostname", "fastdds.physical_data.host", "dds.sys_info.hostname")
 _PROCESS_PROPERTIES = ("__ProcessName", "dds.sys_info.executable_filepath")
-MOST_PAIRS = 1_000_000
-"""Pairs of a writer and a reader that are looked at.  Strangers may announce ten thousand of each for one topic, and
-nobody wants to wait for a hundred million judgements."""
-_Aspects = str
 _PID_PROPERTIES = ("__Pid", "fastdds.physical_data.process", "dds.sys_info.process_id")
 
 
@@ -99,15 +80,6 @@ class SeenParticipant:
         return ""
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """A writer and a reader of one topic, and what stands between them, if anything does."""
-
-    writer: DiscoveredWriterData
-    reader: DiscoveredReaderData
-    refusal: MatchRefusal | None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
     """What of a census is wanted; texts are shell patterns, empty for anything."""
@@ -139,10 +111,18 @@ def _fits(pattern: str, text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Census:
-    """``participants`` in the order in which they were discovered."""
+    """``participants`` in the order in which they were discovered.
+
+    ``refused``: the writers and readers of one topic that do not fit.  ``left_out``: how many pairs nobody looked at.
+    ``is_complete``: False while others are being asked what their types are made of; their pairs are neither matches
+    nor refused until then.
+    """
 
     domain_id: int
     participants: tuple[SeenParticipant, ...]
+    refused: tuple[tuple[Guid, Guid], ...] = ()
+    left_out: int = 0
+    is_complete: bool = True
 
     def endpoints(self) -> Iterator[tuple[SeenParticipant, SeenEndpoint]]:
         """Every endpoint with its participant."""
@@ -161,64 +141,35 @@ class Census:
                     chosen.append(replace(participant, endpoints=endpoints))
         return replace(self, participants=tuple(chosen))
 
-    def pairs(self) -> Iterator[Pair]:
-        """Every writer with every reader of its topic; at most MOST_PAIRS."""
-        return _pairs([endpoint.data for _, endpoint in self.endpoints()])
 
+def take_census(participant: DomainParticipant, pairs: Iterable[PairExplanation] = (), left_out: int = 0) -> Census:
+    """What ``participant`` knows of the others in its domain; itself it leaves out.
 
-def take_census(participant: DomainParticipant) -> Census:
-    """What ``participant`` knows of the others in its domain; itself it leaves out."""
+    ``pairs``: who fits whom, and how many more pairs there are; see ``dcps.explaining.pairs_seen``.
+    """
     endpoints: list[DiscoveredEndpointData] = [
         *participant.discovered_publications(),
         *participant.discovered_subscriptions(),
     ]
     matches: dict[Guid, list[Guid]] = {data.guid: [] for data in endpoints}
-    for pair in _pairs(endpoints):
-        if pair.refusal is None:
-            matches[pair.writer.guid].append(pair.reader.guid)
-            matches[pair.reader.guid].append(pair.writer.guid)
+    refused: list[tuple[Guid, Guid]] = []
+    is_complete = True
+    for pair in pairs:
+        writer, reader = pair.writer.guid, pair.reader.guid
+        if pair.writer.topic_name != pair.reader.topic_name or writer not in matches or reader not in matches:
+            continue  # two topics that were probably meant to be one; the participant's own
+        if pair.is_matching:
+            matches[writer].append(reader)
+            matches[reader].append(writer)
+        elif pair.disagreements:
+            refused.append((writer, reader))
+        else:
+            is_complete = False
     by_prefix: dict[GuidPrefix, list[SeenEndpoint]] = {}
     for data in endpoints:
         by_prefix.setdefault(data.guid.prefix, []).append(SeenEndpoint(data, tuple(matches[data.guid])))
-    return Census(
-        participant.domain_id,
-        tuple(
-            SeenParticipant(data, tuple(by_prefix.get(data.guid.prefix, ())))
-            for data in participant.discovered_participants()
-        ),
+    participants = tuple(
+        SeenParticipant(data, tuple(by_prefix.get(data.guid.prefix, ())))
+        for data in participant.discovered_participants()
     )
-
-
-def _pairs(endpoints: list[DiscoveredEndpointData]) -> Iterator[Pair]:
-    topics: dict[str, tuple[list[DiscoveredWriterData], list[DiscoveredReaderData]]] = {}
-    for data in endpoints:
-        writers, readers = topics.setdefault(data.topic_name, ([], []))
-        if isinstance(data, DiscoveredWriterData):
-            writers.append(data)
-        elif isinstance(data, DiscoveredReaderData):
-            readers.append(data)
-    return islice(_judged(topics.values()), MOST_PAIRS)
-
-
-def _judged(
-    topics: Iterable[tuple[list[DiscoveredWriterData], list[DiscoveredReaderData]]],
-) -> Iterator[Pair]:
-    """Endpoints of one kind are usually alike in all that a judgement looks at: it is made once for all of them."""
-    judgements: dict[tuple[_Aspects, _Aspects], MatchRefusal | None] = {}
-    for writers, readers in topics:
-        sides = [(reader, _aspects(reader)) for reader in readers]
-        for writer in writers:
-            offered = _aspects(writer)
-            for reader, requested in sides:
-                key = (offered, requested)
-                if key not in judgements:
-                    judgements[key] = judge(writer, reader)
-                yield Pair(writer, reader, judgements[key])
-
-
-def _aspects(data: DiscoveredEndpointData) -> _Aspects:
-    """All that :func:`~ddsi.discovery.matching.judge` looks at, as one text: texts keep their hash."""
-    qos = data.qos
-    kinds = (qos.reliability, qos.durability, qos.ownership, qos.liveliness, qos.destination_order, qos.presentation)
-    times = (qos.deadline, qos.latency_budget)
-    return repr((data.type_name, data.is_keyed, qos.partition, kinds, times, qos.data_representation))
+    return Census(participant.domain_id, participants, tuple(refused), left_out, is_complete)

@@ -22,6 +22,8 @@ def census_json(census: Census, drop_counts: Mapping[str, int] | None = None) ->
         "domain_id": census.domain_id,
         "participants": [participant_json(participant, census.domain_id) for participant in census.participants],
         "topics": topics_json(census),
+        "complete": census.is_complete,
+        "left_out": census.left_out,
     }
     if drop_counts is not None:
         form["stats"] = {"dropped": dict(sorted(drop_counts.items()))}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Literal
 
+from ..structure.guid import Guid
 from ..structure.locator import Locator, LocatorKind
-from ..trace.wording import seconds_text
+from ..trace.wording import count_text, seconds_text
 from .census import Census, SeenParticipant
 from .qos_words import qos_words
 from .tables import Table, shown
@@ -26,6 +28,9 @@ def census_lines(census: Census, views: tuple[View, ...], drop_counts: Mapping[s
     lines: list[str] = []
     for table in tables:
         lines += ["", *table.lines()] if lines else table.lines()
+    if census.left_out:
+        pairs = count_text(census.left_out, "more pair")
+        lines += ["", f"Not compared: {pairs} of a writer and a reader; choose a topic (--topic)."]
     return lines
 
 
@@ -76,13 +81,14 @@ def _participants(census: Census) -> Table:
 def _topics(census: Census) -> Table:
     types: dict[str, dict[str, None]] = {}
     counts: dict[str, list[int]] = {}
+    topic_of: dict[Guid, str] = {}
     for _, endpoint in census.endpoints():
-        topic = endpoint.data.topic_name
+        topic = topic_of[endpoint.data.guid] = endpoint.data.topic_name
         types.setdefault(topic, {})[endpoint.data.type_name] = None
         counts.setdefault(topic, [0, 0])[endpoint.kind == "reader"] += 1
-    unmatched = dict.fromkeys(types, 0)
-    for pair in census.pairs():
-        unmatched[pair.writer.topic_name] += pair.refusal is not None
+    unmatched = Counter(
+        topic_of[writer] for writer, reader in census.refused if writer in topic_of and reader in topic_of
+    )
     table = Table(
         f"Topics: {len(types)}",
         ("TOPIC", "TYPE", "WRITERS", "READERS", "NOT MATCHING"),

@@ -11,6 +11,7 @@ from typing import get_args
 import trio
 
 from ..dcps import DomainParticipant
+from ..dcps.explaining import pairs_seen
 from ..structure.qos import Qos
 from .arguments import add_domain, add_json, add_listening
 from .census import Census, Selection, take_census
@@ -18,7 +19,7 @@ from .census_changes import changes
 from .census_json import census_json
 from .census_tables import View, census_lines
 from .exit_status import ExitStatus
-from .listening import listen, observer
+from .listening import listen, observer, with_types
 from .runner import run as run_async
 from .terminal import Screen, is_terminal
 
@@ -70,7 +71,8 @@ class _Listing:
         async with observer(arguments.domain, Qos(entity_name="ddsi ls")) as participant:
             if not arguments.watch:
                 await listen(participant, arguments.time)
-                print("\n".join(self._lines(participant)))
+                census = await with_types(participant, lambda: self._census(participant))
+                print("\n".join(self._lines(census, participant)))
                 if not participant.discovered_participants():
                     print("ddsi ls: nobody answered; `ddsi doctor` looks at this host's network", file=sys.stderr)
                 return ExitStatus.OK
@@ -84,7 +86,7 @@ class _Listing:
         elif is_terminal():
             with Screen() as screen:
                 while True:
-                    screen.paint(self._lines(participant))
+                    screen.paint(self._lines(self._census(participant), participant))
                     await _change(participant)
         else:
             await self._watch_as_lines(participant)
@@ -93,7 +95,7 @@ class _Listing:
         """The whole structure on one line, at first and whenever it has changed."""
         said = None
         while True:
-            line = json.dumps(self._json(participant))
+            line = json.dumps(census_json(self._census(participant), self._drop_counts(participant)))
             if line != said:
                 print(line, flush=True)
                 said = line
@@ -108,16 +110,16 @@ class _Listing:
             known = census
             await _change(participant)
 
-    def _lines(self, participant: DomainParticipant) -> list[str]:
+    def _lines(self, census: Census, participant: DomainParticipant) -> list[str]:
+        drop_counts = self._drop_counts(participant)
         if self._arguments.json:
-            return [json.dumps(self._json(participant), indent=2)]
-        return census_lines(self._census(participant), self._views, self._drop_counts(participant))
-
-    def _json(self, participant: DomainParticipant) -> dict[str, object]:
-        return census_json(self._census(participant), self._drop_counts(participant))
+            return [json.dumps(census_json(census, drop_counts), indent=2)]
+        return census_lines(census, self._views, drop_counts)
 
     def _census(self, participant: DomainParticipant) -> Census:
-        return take_census(participant).select(self._selection)
+        if self._views == ("participants",) and not self._arguments.json:  # nobody is compared with anybody
+            return take_census(participant).select(self._selection)
+        return take_census(participant, *pairs_seen(participant, self._selection.topic)).select(self._selection)
 
     def _drop_counts(self, participant: DomainParticipant) -> dict[str, int] | None:
         return dict(participant.drop_counts()) if self._arguments.stats else None

@@ -11,9 +11,6 @@ import json
 import re
 from collections.abc import Iterable, Iterator
 
-import trio
-
-from ..dcps import DomainParticipant
 from ..discovery.explanation import Explanation, PairExplanation, ParticipantTrouble
 from ..discovery.remedies import Disagreement
 from ..structure.guid import Guid
@@ -22,7 +19,7 @@ from .arguments import add_domain, add_json, add_listening
 from .census import Census, SeenParticipant, take_census
 from .census_tables import who
 from .exit_status import ExitStatus
-from .listening import listen, observer
+from .listening import listen, observer, with_types
 from .runner import run as run_async
 from .tables import shown
 from .topic_session import add_security, participant_qos
@@ -32,8 +29,6 @@ __all__ = ["SUMMARY", "add_arguments", "run"]
 SUMMARY = "say why endpoints of a topic do not match, and what to do"
 
 _MOST_NAMED = 4
-_TYPES_S = 4.0
-"""How long to wait for what others' types are made of: longer than their participants are asked for them."""
 _GUID = re.compile(r"(?:[0-9a-f]{8}:){3}[0-9a-f]{8}|[0-9a-f]{32}", re.IGNORECASE)
 
 
@@ -61,24 +56,13 @@ async def _explain(arguments: argparse.Namespace) -> int:
     async with observer(arguments.domain, participant_qos(arguments, "ddsi why")) as participant:
         participant.explain(*asked)  # what cannot be asked is refused before the listening
         await listen(participant, arguments.time)
-        explanation = await _with_types(participant, asked)
+        explanation = await with_types(participant, lambda: participant.explain(*asked))
         census = take_census(participant)
     if arguments.json:
         print(json.dumps(_explanation_json(census, explanation), indent=2))
     else:
         print("\n".join(_lines(census, explanation)))
     return ExitStatus.OK if _is_well(explanation) else ExitStatus.NOT_AS_HOPED
-
-
-async def _with_types(participant: DomainParticipant, asked: list[str | Guid]) -> Explanation:
-    """What is to be said, when everybody has told what types are made of, or had the time to."""
-    explanation = participant.explain(*asked)
-    with trio.move_on_after(_TYPES_S):
-        while not explanation.is_complete:
-            with trio.move_on_after(0.25):
-                await participant.wait_for_discovery()
-            explanation = participant.explain(*asked)
-    return explanation
 
 
 def _is_well(explanation: Explanation) -> bool:

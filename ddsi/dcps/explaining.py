@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from ..discovery.explanation import Explanation
+from typing import TYPE_CHECKING
+
+from ..discovery.explanation import Explanation, PairExplanation
 from ..engine import Participant
-from ..engine.explaining import explain, explain_endpoints
+from ..engine.explaining import explain, explain_endpoints, explain_pairs
 from ..structure.errors import BadParameter
 from ..structure.guid import Guid
 
-__all__ = ["explain_all"]
+if TYPE_CHECKING:
+    from .participant import DomainParticipant
+
+__all__ = ["explain_all", "pairs_seen"]
 
 
 def explain_all(engine: Participant, asked: tuple[str | Guid, ...], now: float) -> Explanation:
@@ -27,3 +32,14 @@ def explain_all(engine: Participant, asked: tuple[str | Guid, ...], now: float) 
             if is_all:
                 raise BadParameter(f"{', '.join(map(str, guids))} are all {kind}: a writer and a reader are wanted")
     return explain_endpoints(engine, guids, now)
+
+
+def pairs_seen(participant: DomainParticipant, topic: str = "") -> tuple[tuple[PairExplanation, ...], int]:
+    """The pairs of ``participant.explain(topic)``, and its ``left_out``, without what else it finds.
+
+    For tools that look again and again: names that may have been meant take long to find.
+    """
+    pump = participant._running_pump()
+    found = explain_pairs(pump.engine, topic, pump.now())
+    pump.settle()  # questions about types
+    return found

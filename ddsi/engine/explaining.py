@@ -34,7 +34,7 @@ from .type_matching import TypeVerdict
 if TYPE_CHECKING:
     from .participant import Participant
 
-__all__ = ["explain", "explain_endpoints", "judged_pair"]
+__all__ = ["explain", "explain_endpoints", "explain_pairs", "judged_pair"]
 
 _SEDP_READERS = (ids.SEDP_PUBLICATIONS_READER, ids.SEDP_SUBSCRIPTIONS_READER)
 _MOST_LOCATORS = 4
@@ -54,15 +54,19 @@ _DROPS = {
 
 def explain(engine: Participant, topic: str, now: float) -> Explanation:
     """All pairs of the topic (its name, or a shell pattern; empty for all topics), and what else stands in the way."""
-    writers, readers = _writers(engine), _readers(engine)
-    pairs, left_out = explained_pairs(writers, readers, _Judge(engine, now), topic)
+    pairs, left_out = explain_pairs(engine, topic, now)
     return Explanation(
         asked=(topic,) if topic else (),
         pairs=pairs,
-        lonely=lonely_topics(writers, readers, topic),
+        lonely=lonely_topics(_writers(engine), _readers(engine), topic),
         troubles=tuple(_troubles(engine)),
         left_out=left_out,
     )
+
+
+def explain_pairs(engine: Participant, topic: str, now: float) -> tuple[tuple[PairExplanation, ...], int]:
+    """The pairs alone, and how many more there are than were looked at."""
+    return explained_pairs(_writers(engine), _readers(engine), _Judge(engine, now), topic)
 
 
 def explain_endpoints(engine: Participant, guids: tuple[Guid, ...], now: float) -> Explanation:

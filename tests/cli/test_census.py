@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Annotated
 
 import pytest
@@ -10,13 +11,12 @@ import trio
 
 import ddsi
 from ddsi import idl
-from ddsi.cli import census as census_module
 from ddsi.cli.census import Census, Selection, take_census
 from ddsi.cli.census_changes import changes
 from ddsi.cli.census_json import census_json, topics_json
 from ddsi.cli.census_tables import census_lines, who
-from ddsi.discovery.matching import judge
-from ddsi.structure import qos_policies as p
+from ddsi.cli.listening import with_types
+from ddsi.dcps.explaining import pairs_seen
 from ddsi.structure.qos import EndpointQos
 from ddsi.structure.vendor import FAST_DDS
 
@@ -27,47 +27,6 @@ LOOPBACK = ddsi.Config(interfaces=("127.0.0.1",))
 
 def _guids(census: Census) -> list[str]:
     return [f"{endpoint.kind} {endpoint.data.topic_name}" for _, endpoint in census.endpoints()]
-
-
-def test_pairs_are_of_one_topic() -> None:
-    seen = census(writer("A"), writer("B", number=2), reader("B"), reader("B", number=2), reader("C", number=3))
-    assert [(pair.writer.topic_name, pair.reader.guid[14]) for pair in seen.pairs()] == [("B", 1), ("B", 2)]
-    assert all(pair.refusal is None for pair in seen.pairs())
-
-
-def test_a_judgement_serves_only_those_that_are_alike() -> None:
-    """Every policy that the rules look at makes a difference: each pair is judged as if it were the only one."""
-    variants = [
-        EndpointQos(),
-        EndpointQos(reliability=p.Reliable()),
-        EndpointQos(durability=p.TransientLocal()),
-        EndpointQos(presentation=p.Presentation(p.AccessScope.TOPIC)),
-        EndpointQos(deadline=p.Deadline(1)),
-        EndpointQos(latency_budget=p.LatencyBudget(1)),
-        EndpointQos(ownership=p.Exclusive()),
-        EndpointQos(liveliness=p.ManualByTopic(1)),
-        EndpointQos(liveliness=p.ManualByTopic(2)),
-        EndpointQos(destination_order=p.BySourceTimestamp()),
-        EndpointQos(partition=p.Partition("a")),
-        EndpointQos(data_representation=p.DataRepresentation(2)),
-    ]
-    numbered = list(enumerate(variants, 1))
-    seen = census(
-        *(writer(number=number, qos=qos) for number, qos in numbered),
-        *(reader(number=number, qos=qos) for number, qos in numbered),
-        writer(number=90, type_name="Other"), reader(number=91, keyed=False),
-    )  # fmt: skip
-    pairs = list(seen.pairs())
-    assert len(pairs) == 13 * 13
-    assert all(pair.refusal == judge(pair.writer, pair.reader) for pair in pairs)
-    assert {pair.refusal is None for pair in pairs} == {True, False}
-
-
-def test_pairs_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Strangers may announce any number of endpoints of one topic."""
-    monkeypatch.setattr(census_module, "MOST_PAIRS", 10)
-    seen = census(*(writer(number=n) for n in range(1, 100)), *(reader(number=n) for n in range(1, 100)))
-    assert len(list(seen.pairs())) == 10
 
 
 @pytest.mark.parametrize(
@@ -131,7 +90,8 @@ def test_changes() -> None:
 
 
 def test_topics_with_two_types_show_both() -> None:
-    seen = census(writer("A"), reader("A", type_name="Other"), writer("B", number=2))
+    offered, requested = writer("A"), reader("A", type_name="Other")
+    seen = replace(census(offered, requested, writer("B", number=2)), refused=((offered.guid, requested.guid),))
     assert [(topic["topic"], topic["types"]) for topic in topics_json(seen)] == [
         ("A", ["ShapeType", "Other"]),
         ("B", ["ShapeType"]),
@@ -139,6 +99,17 @@ def test_topics_with_two_types_show_both() -> None:
     lines = census_lines(seen, ("topics",))
     assert lines[2].split() == ["A", "ShapeType,", "Other", "1", "1", "1", "(see:", "ddsi", "why)"]
     assert lines[3].split() == ["B", "ShapeType", "1", "0", "-"]
+    apart = seen.select(Selection(participant="01100000:00000000:00000001"))
+    assert census_lines(apart, ("topics",))[2].split() == ["A", "ShapeType", "1", "0", "-"], "the reader is not chosen"
+
+
+def test_what_was_not_compared_is_told() -> None:
+    seen = replace(census(writer()), left_out=7)
+    assert census_lines(seen, ("topics",))[-1] == (
+        "Not compared: 7 more pairs of a writer and a reader; choose a topic (--topic)."
+    )
+    assert census_json(seen)["left_out"] == 7
+    assert not any("Not compared" in line for line in census_lines(census(writer()), ("topics",)))
 
 
 def test_drop_counters_most_first() -> None:
@@ -165,7 +136,7 @@ async def _look(domain: int) -> Census:
             with trio.fail_after(10):
                 while not observer.discovered_participants() or not observer.knows_all_announced():
                     await trio.sleep(0.01)
-            return take_census(observer)
+            return take_census(observer, *pairs_seen(observer))
 
 
 def test_a_census_of_real_participants() -> None:
@@ -182,11 +153,56 @@ def test_a_census_of_real_participants() -> None:
     assert found.endpoints[0].matches == (found.endpoints[1].data.guid,)
 
 
+@idl.struct(typename="Celsius")
+class Renamed:
+    sensor: Annotated[idl.int32, idl.key]
+    value: idl.float64
+
+
+@idl.struct(typename="Reading")
+class Changed:
+    sensor: Annotated[idl.int32, idl.key]
+    value: str
+
+
+async def _look_at_types(domain: int) -> tuple[list[bool], Census]:
+    async with (
+        ddsi.DomainParticipant(domain, config=LOOPBACK) as other,
+        ddsi.DomainParticipant(domain, config=LOOPBACK) as observer,
+    ):
+        ddsi.DataWriter(other, ddsi.Topic(other, "Reading", Reading))
+        for kind in (Reading, Renamed, Changed):
+            ddsi.DataReader(other, ddsi.Topic(other, "Reading", kind))
+        completeness: list[bool] = []
+
+        def look() -> Census:
+            seen = take_census(observer, *pairs_seen(observer))
+            completeness.append(seen.is_complete)
+            return seen
+
+        with trio.fail_after(10):
+            while len(observer.discovered_subscriptions()) < 3 or not observer.discovered_publications():
+                await trio.sleep(0.01)
+            return completeness, await with_types(observer, look)
+
+
+def test_types_are_compared_by_what_they_are_made_of() -> None:
+    """One of another name fits, one of the same name with another member does not; both sides are asked first."""
+    completeness, seen = trio.run(_look_at_types, 173)
+    (found,) = seen.participants
+    offering, same, renamed, changed = found.endpoints
+    assert [endpoint.data.type_name for endpoint in found.endpoints] == ["Reading", "Reading", "Celsius", "Reading"]
+    assert offering.matches == (same.data.guid, renamed.data.guid)
+    assert seen.refused == ((offering.data.guid, changed.data.guid),)
+    assert (completeness[0], completeness[-1]) == (False, True)
+
+
 def test_the_json_of_a_census() -> None:
     """The structure that docs/cli.md promises: every member, with its type."""
     seen = trio.run(_look, 172)
     form = json.loads(json.dumps(census_json(seen, {"own_message": 2}), allow_nan=False))
-    assert list(form) == ["domain_id", "participants", "topics", "stats"]
+    assert list(form) == ["domain_id", "participants", "topics", "complete", "left_out", "stats"]
+    assert (form["complete"], form["left_out"]) == (True, 0)
     assert form["stats"] == {"dropped": {"own_message": 2}}
     (found,) = form["participants"]
     writer_form, reader_form, apart = found.pop("endpoints")

@@ -8,6 +8,7 @@ import pytest
 
 import ddsi
 from ddsi.dcps import refusal_log
+from ddsi.engine.explaining import judged_pair
 from ddsi.structure.guid import Guid
 
 from .running import Note, Shape, eventually, in_trio
@@ -47,6 +48,36 @@ async def test_two_guids_are_compared_whatever_their_topics_are(domain: int) -> 
         assert [one.policy for one in pair.disagreements] == ["topic"]
         stranger = Guid(bytes(15) + b"\x07")
         assert here.explain(writer.guid, stranger).unknown == (stranger,)
+
+
+@in_trio
+async def test_a_judgement_serves_only_those_that_are_alike(domain: int) -> None:
+    """Every policy that the rules look at makes a difference: each pair is judged as if it were the only one."""
+    variants = [
+        ddsi.Qos(),
+        ddsi.Qos(reliability=ddsi.BestEffort()),
+        ddsi.Qos(durability=ddsi.TransientLocal()),
+        ddsi.Qos(deadline=ddsi.Deadline(1)),
+        ddsi.Qos(latency_budget=ddsi.LatencyBudget(1)),
+        ddsi.Qos(ownership=ddsi.Exclusive()),
+        ddsi.Qos(liveliness=ddsi.ManualByTopic(1)),
+        ddsi.Qos(liveliness=ddsi.ManualByTopic(2)),
+        ddsi.Qos(destination_order=ddsi.BySourceTimestamp()),
+        ddsi.Qos(partition=ddsi.Partition("a")),
+        ddsi.Qos(data_representation=ddsi.DataRepresentation(ddsi.XCDR2)),
+        ddsi.Qos(presentation=ddsi.Presentation(ddsi.AccessScope.TOPIC)),
+    ]
+    async with ddsi.DomainParticipant(domain) as here, ddsi.DomainParticipant(domain) as there:
+        topic = ddsi.Topic(there, "Square", Shape)
+        for qos in variants:
+            ddsi.DataWriter(ddsi.Publisher(there, qos), topic, qos)
+            ddsi.DataReader(ddsi.Subscriber(there, qos), topic, qos)
+        await eventually(lambda: len(here.explain("Square").pairs) == len(variants) ** 2)
+        pump = here._running_pump()
+        pairs = here.explain("Square").pairs
+        alone = [judged_pair(pump.engine, pair.writer, pair.reader, pump.now()) for pair in pairs]
+        assert list(pairs) == alone
+        assert {pair.is_matching for pair in pairs} == {True, False}
 
 
 @in_trio
