@@ -1,7 +1,7 @@
 """The keys of pairs: ours go to each matched endpoint of a peer, and a pair is complete when the peer's have come.
 
-DDS-Security 1.1 §8.8.9, §8.5.1.8.  Keys travel on the volatile secure topic, one message for a participant and one for
-each pair of endpoints.  That topic and discovery are two streams, so a key may come before the endpoint that it is
+DDS-Security 1.1 §8.8.9, §8.5.1.7-8.  Keys travel on the volatile secure topic, one message for a participant and one
+for each pair of endpoints.  That topic and discovery are two streams, so a key may come before the endpoint that it is
 for is known: such messages are kept, so many for each peer and so long, and are used when the pair is matched.
 
 A pair waits for what it needs to decode the other side, and no longer:
@@ -11,11 +11,21 @@ A pair waits for what it needs to decode the other side, and no longer:
   wait: Cyclone DDS's readers have no key then, and send none;
 * both for the participant's key, where whole messages are protected.
 
+A match may end and begin again while both endpoints live, as policies and rights change, and the two sides need not
+agree on whether it ended: each judges by what it knows.  Therefore
+
+* keys outlive the match: they are wiped when one of the two endpoints is gone.  Until the two match again nothing is
+  protected or opened with them;
+* who matches again sends its keys again, and they are the same, for a peer that has kept its match may look at the
+  first only;
+* keys that come once more say that the peer has matched anew, and may have thrown ours away: it is sent ours again.
+
 Only what a peer wrote under the key that the two share is looked at here, and it may speak for itself alone.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, Protocol
 
@@ -41,6 +51,8 @@ MAX_EARLY_KEYS: Final = 512
 """Of one peer; as many pairs of endpoints may be under way at a time."""
 EARLY_KEYS_S: Final = 300.0
 """Cyclone DDS keeps them as long."""
+_ANSWER_AFTER_S: Final = 3.0
+"""Keys that come sooner after ours were sent are the answer to ours.  Else two that match anew would never end."""
 
 
 CryptoHandle = DatawriterCryptoHandle | DatareaderCryptoHandle
@@ -50,15 +62,20 @@ CryptoHandle = DatawriterCryptoHandle | DatareaderCryptoHandle
 class Pair:
     """An endpoint of ours and one of a peer.  ``handle`` is the plugin's of the latter; None where nothing is keyed.
 
-    ``awaits_key``: the peer's keys for it are still to come.  ``is_open``: the two were said to be matched.
+    ``needs_key``: it takes the peer's keys to open what it sends; ``has_key``: they have come.  ``is_open``: the two
+    were said to be matched.  ``is_parted``: they are matched no more, and were not asked about since.
     """
 
     local: LocalEndpoint
     remote: Guid
     participant: RemoteParticipant
     handle: CryptoHandle | None
-    awaits_key: bool
+    needs_key: bool
+    relay_only: bool
+    has_key: bool = False
     is_open: bool = False
+    is_parted: bool = False
+    sent_at: float = -math.inf
     remote_entity: bytes = b""
     """Its entity id."""
     is_volatile: bool = False
@@ -111,38 +128,40 @@ class KeyExchange:
     ) -> Admission:
         """Make a pair of two endpoints that may match.  PENDING until the peer's keys are there."""
         pair = self.pairs.get((local.guid, remote))
+        if pair is not None and pair.is_parted and pair.relay_only != relay_only:
+            self._remove(pair)
+            pair = None
+        is_known = pair is not None and not pair.is_parted
         if pair is None:
             pair = self._register(local, remote, participant, relay_only=relay_only)
-            if not local.is_volatile:
-                self._send_keys(pair)
-                self._use_early(pair, now)
+        pair.is_parted = False
+        if not is_known and not local.is_volatile:
+            self._send_keys(pair, now)
+            self._use_early(pair, now)
         pair.is_open = self._is_complete(pair)
         return ADMITTED if pair.is_open else PENDING
 
     def unmatch(self, local: Guid, remote: Guid) -> None:
-        """The pair is no more; its keys are wiped."""
-        pair = self.pairs.pop((local, remote), None)
-        if pair is None:
-            return
-        others = self.by_remote[remote]
-        others.remove(pair)
-        if not others:
-            del self.by_remote[remote]
-        pair.participant.early.pop((local, remote), None)
-        if pair.handle is not None:
-            del self.by_handle[pair.handle]
-            self._unregister(pair.handle)
+        """The two are matched no more.  They may be again, so their keys are kept, and not used."""
+        pair = self.pairs.get((local, remote))
+        if pair is not None:
+            pair.is_open, pair.is_parted = False, True
+
+    def remote_endpoint_lost(self, remote: Guid) -> None:
+        """A peer's endpoint is gone: its keys are wiped."""
+        for pair in list(self.by_remote.get(remote, ())):
+            self._remove(pair)
 
     def endpoint_deleted(self, local: LocalEndpoint) -> None:
-        for pair in [pair for pair in self.pairs if pair[0] == local.guid]:
-            self.unmatch(*pair)
+        for pair in [pair for pair in self.pairs.values() if pair.local is local]:
+            self._remove(pair)
         if local.handle is not None:
             self._unregister(local.handle)
 
     def forget(self, participant: RemoteParticipant) -> None:
         """The participant is gone, and all its pairs with it.  The key that the two share goes last (§8.5.1.7.7)."""
-        for local, remote in [pair for pair in self.pairs if pair[1].prefix == participant.guid.prefix]:
-            self.unmatch(local, remote)
+        for pair in [pair for pair in self.pairs.values() if pair.participant is participant]:
+            self._remove(pair)
         participant.early.clear()
         if participant.crypto is not None:
             self._cryptographic.unregister_participant(participant.crypto)
@@ -161,28 +180,39 @@ class KeyExchange:
         self, local: LocalEndpoint, remote: Guid, participant: RemoteParticipant, *, relay_only: bool
     ) -> Pair:
         handle: CryptoHandle | None = None
-        attributes, awaits_key = local.attributes, False
+        attributes, needs_key = local.attributes, False
         if local.handle is not None and participant.crypto is not None and participant.shared_secret is not None:
             if isinstance(local.handle, DatawriterCryptoHandle):
                 handle = self._cryptographic.register_matched_remote_datareader(
                     local.handle, participant.crypto, participant.shared_secret, relay_only=relay_only
                 )
-                awaits_key = attributes.is_submessage_protected
+                needs_key = attributes.is_submessage_protected
             else:
                 handle = self._cryptographic.register_matched_remote_datawriter(
                     local.handle, participant.crypto, participant.shared_secret
                 )
-                awaits_key = attributes.is_submessage_protected or attributes.is_payload_protected
-        pair = Pair(local, remote, participant, handle, awaits_key and not local.is_volatile)
+                needs_key = attributes.is_submessage_protected or attributes.is_payload_protected
+        pair = Pair(local, remote, participant, handle, needs_key and not local.is_volatile, relay_only)
         self.pairs[(local.guid, remote)] = pair
         self.by_remote.setdefault(bytes(remote), []).append(pair)
         if handle is not None:
             self.by_handle[handle] = pair
         return pair
 
+    def _remove(self, pair: Pair) -> None:
+        """Its keys are wiped."""
+        del self.pairs[pair.local.guid, pair.remote]
+        others = self.by_remote[pair.remote]
+        others.remove(pair)
+        if not others:
+            del self.by_remote[pair.remote]
+        if pair.handle is not None:
+            del self.by_handle[pair.handle]
+            self._unregister(pair.handle)
+
     def _is_complete(self, pair: Pair) -> bool:
         needs_participant_key = self._is_rtps_protected and not pair.local.is_volatile
-        return not pair.awaits_key and (pair.participant.has_keys or not needs_participant_key)
+        return (pair.has_key or not pair.needs_key) and (pair.participant.has_keys or not needs_participant_key)
 
     def _unregister(self, handle: CryptoHandle) -> None:
         if isinstance(handle, DatawriterCryptoHandle):
@@ -198,7 +228,8 @@ class KeyExchange:
         tokens = self._cryptographic.create_local_participant_crypto_tokens(self._local_participant, participant.crypto)
         self._post(participant, PARTICIPANT_CRYPTO_TOKENS, tokens, GUID_UNKNOWN, GUID_UNKNOWN)
 
-    def _send_keys(self, pair: Pair) -> None:
+    def _send_keys(self, pair: Pair, now: float) -> None:
+        pair.sent_at = now
         local, remote = pair.local.handle, pair.handle
         if isinstance(local, DatawriterCryptoHandle) and isinstance(remote, DatareaderCryptoHandle):
             tokens = self._cryptographic.create_local_datawriter_crypto_tokens(local, remote)
@@ -240,7 +271,10 @@ class KeyExchange:
         if pair is None:
             self._keep_early(participant, (local, remote), message, now)
             return None
+        is_repeated = pair.has_key
         refusal = self._endpoint_keys(pair, message)
+        if is_repeated and refusal is None and pair.is_open and now - pair.sent_at >= _ANSWER_AFTER_S:
+            self._send_keys(pair, now)
         self._open(pair)
         return refusal
 
@@ -260,18 +294,18 @@ class KeyExchange:
 
     def _endpoint_keys(self, pair: Pair, message: GenericMessage) -> Refused | None:
         local, remote, tokens = pair.local.handle, pair.handle, message.message_data
-        refusal: Refused | None = None
+        refusal: Refused | None = Refused(f"keys of another kind of endpoint than {pair.remote} is")
         if message.message_class_id == DATAWRITER_CRYPTO_TOKENS:
             if isinstance(local, DatareaderCryptoHandle) and isinstance(remote, DatawriterCryptoHandle):
                 refusal = self._cryptographic.set_remote_datawriter_crypto_tokens(local, remote, tokens)
         elif isinstance(local, DatawriterCryptoHandle) and isinstance(remote, DatareaderCryptoHandle):
             refusal = self._cryptographic.set_remote_datareader_crypto_tokens(local, remote, tokens)
         if refusal is None:
-            pair.awaits_key = False
+            pair.has_key = True
         return refusal
 
     def _open(self, pair: Pair) -> None:
-        if not pair.is_open and self._is_complete(pair):
+        if not pair.is_open and not pair.is_parted and self._is_complete(pair):
             pair.is_open = True
             self._decide(pair.local.guid, pair.remote, ADMITTED)
 

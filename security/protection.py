@@ -150,7 +150,7 @@ class Protection:
         found = self._handles.get(key)
         if found is None:
             pairs = (self._keys.pairs.get((sender, receiver)) for receiver in receivers)
-            handles = [pair.handle for pair in pairs if pair is not None]
+            handles = [pair.handle for pair in pairs if pair is not None and pair.is_open]
             found = self._handles[key] = (
                 [handle for handle in handles if isinstance(handle, DatareaderCryptoHandle)],
                 [handle for handle in handles if isinstance(handle, DatawriterCryptoHandle)],
@@ -224,10 +224,10 @@ class Protection:
             return whose
         is_readers = whose.category is _DATAREADER_SUBMESSAGE
         sender = whose.datareader if is_readers else whose.datawriter
-        pair = self._keys.by_handle.get(sender) if sender is not None else None
+        pair = self._open_pair(sender) if sender is not None else None
         if pair is None:
             return NOT_FOR_US
-        receiver = pair.local.handle
+        receiver, sender = pair.local.handle, pair.handle
         if isinstance(receiver, DatareaderCryptoHandle):
             assert isinstance(sender, DatawriterCryptoHandle)
             plain = self._cryptographic.decode_datawriter_submessage(protected, receiver, sender)
@@ -250,6 +250,13 @@ class Protection:
                     self._openers.clear()
                 self._openers[source + bytes(protected[:_ALIKE])] = opener, pair
         return plain
+
+    def _open_pair(self, sender: DatawriterCryptoHandle | DatareaderCryptoHandle) -> Pair | None:
+        """The pair that has this handle of a sender; or, if that has parted, another that has the sender's key."""
+        pair = self._keys.by_handle.get(sender)
+        if pair is None or pair.is_open:
+            return pair
+        return next((other for other in self._keys.by_remote[pair.remote] if other.is_open), None)
 
     def _speaks_for_itself(self, plain: Octets, pair: Pair) -> bool:
         """Is the sender that a submessage names the one whose key opened it?  INFO_TS names none (Fast DDS)."""
@@ -278,6 +285,8 @@ class Protection:
         pair = self._payload_pair(writer)
         if pair is None:
             return payload
+        if not pair.is_open:
+            return NOT_FOR_US
         local, remote = pair.local.handle, pair.handle
         assert isinstance(local, DatareaderCryptoHandle)
         assert isinstance(remote, DatawriterCryptoHandle)
@@ -301,10 +310,14 @@ class Protection:
         )
 
     def _payload_pair(self, writer: Guid) -> Pair | None:
+        """One that is open, if there is any."""
+        found = None
         for pair in self._keys.by_remote.get(writer, ()):
             if pair.local.attributes.is_payload_protected:
-                return pair
-        return None
+                if pair.is_open:
+                    return pair
+                found = pair
+        return found
 
     # --- what must be protected --------------------------------------------------------------------------
 

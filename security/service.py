@@ -236,6 +236,11 @@ class SecurityService:
         self._keys.unmatch(local, remote)
         self._protection.changed()
 
+    def remote_endpoint_lost(self, guid: Guid) -> None:
+        if guid in self._keys.by_remote:
+            self._keys.remote_endpoint_lost(guid)
+            self._protection.changed()
+
     def participant_security(self, participant: Guid) -> ParticipantSecurity:
         return self._information.participant(participant)
 

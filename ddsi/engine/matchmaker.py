@@ -85,12 +85,14 @@ class Matchmaker:
             if data.guid in writer.behavior.readers:
                 self._unmatch_reader(writer, data.guid, reason, now)
             self._withdraw(writer.guid, data.guid)
+        self._engine.hooks.remote_endpoint_lost(data.guid)
 
     def remote_writer_gone(self, data: DiscoveredWriterData, reason: LossReason, now: float) -> None:
         for reader in self._engine.user_readers(data.topic_name):
             if data.guid in reader.behavior.writers:
                 self.unmatch_writer(reader, data.guid, reason, now)
             self._withdraw(reader.guid, data.guid)
+        self._engine.hooks.remote_endpoint_lost(data.guid)
 
     def is_matched(self, data: DiscoveredEndpointData) -> bool:
         """Does a local endpoint have a match with this remote one?"""

@@ -213,7 +213,15 @@ class SecurityHooks(Protocol):
 
     def unmatch(self, local: Guid, remote: Guid) -> None:
         """A pair of the application's endpoints that was admitted, or pending, is one no more.  Builtin pairs end with
-        :meth:`remote_participant_lost`."""
+        :meth:`remote_participant_lost`.
+
+        Both endpoints may live on, and the two be asked about again: nothing may be protected or opened for the pair
+        until it is admitted again.
+        """
+        ...
+
+    def remote_endpoint_lost(self, guid: Guid) -> None:
+        """An endpoint of the application there is gone; its pairs were unmatched before (§8.5.1.7.8-9)."""
         ...
 
     def local_participant_deleted(self) -> None:

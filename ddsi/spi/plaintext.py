@@ -67,6 +67,9 @@ class Plaintext:
     def unmatch(self, local: Guid, remote: Guid) -> None:
         """Nothing was kept."""
 
+    def remote_endpoint_lost(self, guid: Guid) -> None:
+        """Nothing was kept."""
+
     def local_participant_deleted(self) -> None:
         """Nothing was kept."""
 

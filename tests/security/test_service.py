@@ -263,8 +263,11 @@ def test_an_end_that_nothing_protects_is_believed_only_of_who_cannot_do_better(
     alice.data = replace(alice.data, vendor_id=vendor)
     introduce(alice, bob)
     match_builtin_topics(alice, bob)
+    alice.hooks.local_writer(writer_data(alice))
     bob.hooks.local_reader(reader_data(bob))
+    alice.match(USER_WRITER, bob, USER_READER, "Square")
     bob.match(USER_READER, alice, USER_WRITER, "Square")
+    deliver(alice, bob)
     outcome = bob.hooks.decode_payload(alice.endpoint(USER_WRITER), b"")
     assert outcome == b"" if is_believed else isinstance(outcome, Rejected)
 

@@ -84,6 +84,7 @@ def test_what_is_protected_cannot_be_for_us() -> None:
 def test_it_wants_nothing() -> None:
     PLAINTEXT.handle_timeout(1.0)
     PLAINTEXT.unmatch(GUID, GUID)
+    PLAINTEXT.remote_endpoint_lost(GUID)
     PLAINTEXT.remote_participant_lost(GUID)
     PLAINTEXT.local_endpoint_deleted(GUID)
     assert PLAINTEXT.next_deadline() == math.inf
