@@ -10,11 +10,12 @@ import ipaddress
 import math
 from collections.abc import Mapping
 from dataclasses import field, fields
-from typing import Literal, NoReturn, get_args
+from typing import TYPE_CHECKING, Literal, NoReturn, get_args
 
 from ddsi.structure.vendor import OUR_VENDOR_ID, VendorId
 
 from ..structure.dataclass import dataclass
+from ..structure.keywords import refuse_unknown_keywords
 from .ports import HIGHEST_PORT, PortMapping
 from .refusal import RefusedSetting
 
@@ -128,6 +129,13 @@ class Config:
 
     config_warnings: tuple[str, ...] = field(default=(), compare=False)
     """What was accepted from ``DDSI_URI`` but means nothing here, a sentence with its line for each."""
+
+    if not TYPE_CHECKING:  # type checkers know the names
+
+        def __new__(cls, *positional, **given):
+            if positional or not given.keys() <= cls.__dataclass_fields__.keys():
+                refuse_unknown_keywords("Config", cls.__dataclass_fields__, given, len(positional))
+            return object.__new__(cls)
 
     def __post_init__(self) -> None:
         _check_where(self)

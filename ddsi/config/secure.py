@@ -38,14 +38,22 @@ def secure(keystore: str | os.PathLike[str], *, password: str | None = None) -> 
     folder = Path(keystore).absolute()
     missing = [name for name in _FILES.values() if not (folder / name).is_file()]
     if missing:
-        raise ConfigurationError(
-            f"{folder} is no keystore for a participant: it lacks {', '.join(missing)}; make one with "
-            "`ddsi keystore create`, and name the folder of one identity (DIR/enclaves/NAME)"
-        )
+        raise ConfigurationError(_why_not(folder, missing))
     properties = {name: Property(f"file:{folder / file}") for name, file in _FILES.items()}
     if password is not None:
         properties["dds.sec.auth.password"] = Property(password)
     return Qos(properties=properties)
+
+
+def _why_not(folder: Path, missing: list[str]) -> str:
+    """What is wrong with a folder that lacks these files, and what may have been meant."""
+    if not folder.is_dir():
+        return f"there is no folder {folder}; make a keystore with `ddsi keystore create`"
+    lacks = f"{folder} is no keystore for a participant: it lacks {', '.join(missing)}"
+    for identities in ("enclaves/*/cert.pem", "*/cert.pem"):  # a whole keystore, or the folder of its identities
+        if found := sorted(str(certificate.parent) for certificate in folder.glob(identities)):
+            return f"{lacks}; name the folder of one identity, such as {found[0]}"
+    return f"{lacks}; make one with `ddsi keystore create`, and name the folder of one identity (DIR/enclaves/NAME)"
 
 
 def participant_properties(qos: Properties | None, config: Config) -> Properties:

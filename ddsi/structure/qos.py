@@ -6,12 +6,15 @@ DDS 1.4 §2.2.3.  A :class:`Qos` holds the policies that somebody set and None f
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field, fields, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from . import qos_policies as p
 from .dataclass import dataclass
 from .errors import BadParameter, InconsistentPolicy
+from .keywords import refuse_unknown_keywords
 
 __all__ = ["EndpointQos", "Qos", "reader_qos", "writer_qos"]
 
@@ -51,7 +54,18 @@ class Qos:
     entity_name: str | None = None
     properties: p.Properties = field(default_factory=lambda: MappingProxyType({}))
 
+    if not TYPE_CHECKING:  # type checkers know the names
+
+        def __new__(cls, *positional, **given):
+            if positional or not given.keys() <= cls.__dataclass_fields__.keys():
+                refuse_unknown_keywords("Qos", cls.__dataclass_fields__, given, len(positional))
+            return object.__new__(cls)
+
     def __post_init__(self) -> None:
+        if not isinstance(self.properties, Mapping):
+            raise BadParameter(
+                f"Qos(properties=...) takes a dict of names and values, not {type(self.properties).__name__}"
+            )
         for item in fields(self):
             value = getattr(self, item.name)
             allowed = _ALLOWED.get(item.name)

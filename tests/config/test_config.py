@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ddsi.config import Config, PortMapping
-from ddsi.structure.errors import ConfigurationError
+from ddsi.structure.errors import BadParameter, ConfigurationError
 
 
 def test_defaults_are_valid_and_say_nothing() -> None:
@@ -20,6 +20,14 @@ def test_defaults_are_valid_and_say_nothing() -> None:
 def test_a_config_never_changes() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         Config().lease_duration = 1.0  # type: ignore[misc]
+
+
+def test_a_setting_that_is_not_known_is_refused_with_the_nearest() -> None:
+    make: Any = Config
+    with pytest.raises(BadParameter, match=r"Config\(interface=\.\.\.\) is not known: did you mean interfaces\?"):
+        make(interface=("lo",))
+    with pytest.raises(BadParameter, match="by name"):
+        make(("lo",))
 
 
 def test_repr_tells_what_differs() -> None:

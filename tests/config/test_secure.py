@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,20 @@ def test_a_folder_that_lacks_files_is_refused_by_their_names(folder: Path) -> No
     (folder / "governance.p7s").unlink()
     with pytest.raises(ConfigurationError, match=r"lacks key\.pem, governance\.p7s; make one with `ddsi keystore"):
         secure(folder)
+
+
+def test_a_folder_that_is_not_there_is_told_as_that(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"there is no folder .*/nowhere; make a keystore"):
+        secure(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("named", [".", "enclaves"])
+def test_who_names_the_whole_keystore_is_told_an_identity_in_it(tmp_path: Path, named: str) -> None:
+    alice = tmp_path / "enclaves" / "alice"
+    alice.mkdir(parents=True)
+    (alice / "cert.pem").write_text("content")
+    with pytest.raises(ConfigurationError, match=rf"the folder of one identity, such as {re.escape(str(alice))}$"):
+        secure(tmp_path / named)
 
 
 def test_a_password_is_kept_and_not_shown(folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -119,6 +120,20 @@ def test_a_policy_in_the_wrong_place_is_named_with_what_belongs_there() -> None:
         Qos(durability=Reliable())  # type: ignore[arg-type]
     with pytest.raises(BadParameter, match="property 'x'"):
         Qos(properties={"x": 3})  # type: ignore[dict-item]
+
+
+def test_a_policy_that_is_not_known_is_refused_with_the_nearest() -> None:
+    make: Any = Qos
+    with pytest.raises(BadParameter, match=r"Qos\(reliabilty=\.\.\.\) is not known: did you mean reliability\?"):
+        make(reliabilty=Reliable())
+    with pytest.raises(BadParameter, match="did you mean properties"):
+        make(property={"a": "b"})
+    with pytest.raises(BadParameter, match="there are reliability, durability, "):
+        make(xyzzy=1)
+    with pytest.raises(BadParameter, match=r"by name, as Qos\(reliability=\.\.\.\)"):
+        make(Reliable())
+    with pytest.raises(BadParameter, match="takes a dict, not a str"):
+        make(properties="hush")
 
 
 def test_a_repr_shows_what_was_set_and_no_secret() -> None:
