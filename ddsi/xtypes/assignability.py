@@ -13,6 +13,7 @@ types differently; therefore equality of hashes is enough, but never necessary, 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import Enum
 
 from ..structure.dataclass import dataclass
 from ..structure.qos_policies import TypeConsistency
@@ -67,6 +68,14 @@ class TypeMismatch:
         return f"{self.path}: {self.reason}" if self.path else self.reason
 
 
+class _Keys(Enum):
+    """What keys mean to a type, by where it stands (§7.2.4.4.8: KeyHolder and KeyErased)."""
+
+    OWN = "it is a topic type: its members that are marked are key"
+    MEMBER = "it is the type of such a member, all of which must arrive: bounds count whatever the policy ignores"
+    NONE = "it is the type of another member, and what is marked in it is no key"
+
+
 @dataclass(frozen=True, slots=True)
 class MissingType:
     """It cannot be said: the TypeObject of this identifier is not known, and must be asked for."""
@@ -97,7 +106,7 @@ def type_mismatch(
         return TypeMismatch("", f"the reader takes no type but its own: {reader!r}, not {writer!r}")
     try:
         _Comparison(objects, consistency, ignores_extensibility=ignores_extensibility).compare(
-            reader, writer, "", is_key=False
+            reader, writer, "", _Keys.OWN
         )
     except _MismatchFound as found:
         return found.mismatch
@@ -146,13 +155,12 @@ class _Comparison:
         self._objects = objects
         self._consistency = consistency
         self._ignored = TypeFlag.FINAL | TypeFlag.APPENDABLE if ignores_extensibility else TypeFlag(0)
-        self._compared: set[tuple[TypeIdentifier, TypeIdentifier, bool]] = set()
+        self._compared: set[tuple[TypeIdentifier, TypeIdentifier, _Keys]] = set()
         self._comparisons = 0
         self._depth = 0
 
-    def compare(self, one: TypeIdentifier, two: TypeIdentifier, path: str, *, is_key: bool) -> None:
-        """``is_key``: bounds count whatever the policy ignores, since keys must arrive whole."""
-        pair = (one, two, is_key)
+    def compare(self, one: TypeIdentifier, two: TypeIdentifier, path: str, keys: _Keys) -> None:
+        pair = (one, two, keys)
         if pair in self._compared:  # also while it is being compared: recursive types assume that they will fit
             return
         self._compared.add(pair)
@@ -161,37 +169,38 @@ class _Comparison:
         self._count(1, path)
         self._depth += 1
         if one != two or isinstance(one, UnknownIdentifier):
-            self._compare_shapes(self._shape(one, path), self._shape(two, path), path, is_key=is_key)
+            self._compare_shapes(self._shape(one, path), self._shape(two, path), path, keys)
         self._depth -= 1
 
-    def _compare_shapes(self, one: _Shape, two: _Shape, path: str, *, is_key: bool) -> None:
+    def _compare_shapes(self, one: _Shape, two: _Shape, path: str, keys: _Keys) -> None:
+        is_key = keys is _Keys.MEMBER
         keeps_string_bounds = is_key or not self._consistency.ignore_string_bounds
         keeps_bounds = is_key or not self._consistency.ignore_sequence_bounds
         match one, two:
             case StructObject(), StructObject():
-                _Structs(self, one, two, path).compare()
+                _Structs(self, one, two, path, keys).compare()
             case UnionObject(), UnionObject():
-                _Unions(self, one, two, path).compare()
+                _Unions(self, one, two, path, keys).compare()
             case EnumObject(), EnumObject():
-                self._compare_enums(one, two, path)
+                self._compare_enums(one, two, path, is_key=is_key)
             case StringIdentifier(), StringIdentifier() if one.wide == two.wide:
                 if keeps_string_bounds:
                     _compare_bounds(one.bound, two.bound, path)
             case SequenceIdentifier(), SequenceIdentifier():
                 if keeps_bounds:
                     _compare_bounds(one.bound, two.bound, path)
-                self.compare(one.element, two.element, path + "[]", is_key=is_key)
+                self.compare(one.element, two.element, path + "[]", keys)
             case ArrayIdentifier(), ArrayIdentifier():
                 if one.bounds != two.bounds:
                     raise _MismatchFound(
                         path, f"arrays of {_product(one.bounds)} and of {_product(two.bounds)} elements"
                     )
-                self.compare(one.element, two.element, path + "[]", is_key=is_key)
+                self.compare(one.element, two.element, path + "[]", keys)
             case MapIdentifier(), MapIdentifier():
                 if keeps_bounds:
                     _compare_bounds(one.bound, two.bound, path)
-                self.compare(one.key, two.key, path + "[key]", is_key=is_key)
-                self.compare(one.element, two.element, path + "[]", is_key=is_key)
+                self.compare(one.key, two.key, path + "[key]", keys)
+                self.compare(one.element, two.element, path + "[]", keys)
             case BitmaskObject(), BitmaskObject():
                 if one.bit_bound != two.bit_bound:
                     raise _MismatchFound(path, f"bitmasks of {one.bit_bound} and of {two.bit_bound} bits")
@@ -249,20 +258,26 @@ class _Comparison:
         self._count(sum(map(len, parts)), path)
         return [member for part in reversed(parts) for member in part]
 
-    def compare_member(self, one: MemberObject | CaseObject, two: MemberObject | CaseObject, path: str) -> None:
-        is_key = MemberFlag.KEY in one.flags
+    def compare_member(
+        self, one: MemberObject | CaseObject, two: MemberObject | CaseObject, path: str, *, is_key: bool = False
+    ) -> None:
         name = one.name if one.name.text else two.name  # one's own types have names in minimal TypeObjects too
-        self.compare(one.type, two.type, f"{path}.{name}".strip("."), is_key=is_key)
+        self.compare(one.type, two.type, f"{path}.{name}".strip("."), _Keys.MEMBER if is_key else _Keys.NONE)
 
     def compare_extensibility(self, one: TypeFlag, two: TypeFlag, path: str) -> None:
         if (one ^ two) & _EXTENSIBILITY & ~self._ignored:
             raise _MismatchFound(path, f"{_extensibility(one)} for the reader, {_extensibility(two)} for the writer")
 
-    def _compare_enums(self, one: EnumObject, two: EnumObject, path: str) -> None:
-        """Fast DDS tells no extensibility of enums, which then is not compared."""
+    def _compare_enums(self, one: EnumObject, two: EnumObject, path: str, *, is_key: bool) -> None:
+        """Fast DDS tells no extensibility of enums, which then is not compared; Dust DDS no literals."""
         if one.flags & _EXTENSIBILITY and two.flags & _EXTENSIBILITY:
             self.compare_extensibility(one.flags, two.flags, path)
         _compare_literals(one, two, path)
+        if is_key and one.literals:
+            known = {literal.value for literal in one.literals}
+            for literal in two.literals:
+                if literal.value not in known:
+                    raise _MismatchFound(path, f"it is key, and the reader does not know the literal {literal.name}")
 
     @property
     def ignores_names(self) -> bool:
@@ -277,11 +292,12 @@ class _Comparison:
 
 
 class _Structs:
-    """DDS-XTypes 1.3 §7.2.4.4.7, table "structure types"."""
+    """DDS-XTypes 1.3 §7.2.4.4.8, table "structure types"."""
 
-    def __init__(self, comparison: _Comparison, one: StructObject, two: StructObject, path: str) -> None:
+    def __init__(self, comparison: _Comparison, one: StructObject, two: StructObject, path: str, keys: _Keys) -> None:
         self._comparison = comparison
         self._path = path
+        self._has_keys = keys is not _Keys.NONE
         comparison.compare_extensibility(one.flags, two.flags, path)
         self._is_final = TypeFlag.FINAL in one.flags | two.flags
         self._is_mutable = TypeFlag.MUTABLE in one.flags
@@ -294,7 +310,7 @@ class _Structs:
         self._compare_presence(pairs)
         for one, two in pairs:
             self._compare_keys(one, two)
-            self._comparison.compare_member(one, two, self._path)
+            self._comparison.compare_member(one, two, self._path, is_key=self._is_key(one))
         if not pairs and (self._ones or self._twos):
             raise self._mismatch("the types have no member in common")
 
@@ -332,7 +348,7 @@ class _Structs:
             for member in members:
                 if member.id in common:
                     continue
-                if MemberFlag.KEY in member.flags:
+                if self._is_key(member):
                     raise self._mismatch(f"it is part of the key, and the {other}'s type lacks it", member)
                 if member.flags & (MemberFlag.MUST_UNDERSTAND | MemberFlag.OPTIONAL) == MemberFlag.MUST_UNDERSTAND:
                     raise self._mismatch(f"it must be understood, and the {other}'s type lacks it", member)
@@ -340,9 +356,12 @@ class _Structs:
                 if is_widening and self._comparison.prevents_widening:
                     raise self._mismatch("the writer's type lacks it, and the reader prevents widening", member)
 
+    def _is_key(self, member: MemberObject) -> bool:
+        return self._has_keys and MemberFlag.KEY in member.flags
+
     def _compare_keys(self, one: MemberObject, two: MemberObject) -> None:
-        if (one.flags ^ two.flags) & MemberFlag.KEY:
-            whose = "reader" if MemberFlag.KEY in one.flags else "writer"
+        if self._is_key(one) != self._is_key(two):
+            whose = "reader" if self._is_key(one) else "writer"
             raise self._mismatch(f"it is part of the key in the {whose}'s type only", one)
 
     def _mismatch(self, reason: str, member: MemberObject | None = None) -> _MismatchFound:
@@ -356,20 +375,19 @@ class _Structs:
 class _Unions:
     """DDS-XTypes 1.3 §7.2.4.4.7, table "union types".  Cases correspond by label: vendors number them differently."""
 
-    def __init__(self, comparison: _Comparison, one: UnionObject, two: UnionObject, path: str) -> None:
+    def __init__(self, comparison: _Comparison, one: UnionObject, two: UnionObject, path: str, keys: _Keys) -> None:
         self._comparison = comparison
+        self._has_keys = keys is not _Keys.NONE
         self._one, self._two, self._path = one, two, path
         comparison.compare_extensibility(one.flags, two.flags, path)
         self._is_final = TypeFlag.FINAL in one.flags | two.flags
 
     def compare(self) -> None:
         one, two, path = self._one, self._two, self._path
-        if (one.discriminator_flags ^ two.discriminator_flags) & MemberFlag.KEY:
+        if self._has_keys and (one.discriminator_flags ^ two.discriminator_flags) & MemberFlag.KEY:
             raise _MismatchFound(path, "the discriminator is a key in one of the types only")
-        is_key = MemberFlag.KEY in one.discriminator_flags
-        self._comparison.compare(
-            one.discriminator, two.discriminator, f"{path}.discriminator".strip("."), is_key=is_key
-        )
+        keys = _Keys.MEMBER if self._has_keys and MemberFlag.KEY in one.discriminator_flags else _Keys.NONE
+        self._comparison.compare(one.discriminator, two.discriminator, f"{path}.discriminator".strip("."), keys)
         ones, default_one = _cases(one)
         twos, default_two = _cases(two)
         if (self._is_final or self._comparison.prevents_widening) and ones.keys() != twos.keys():

@@ -291,7 +291,13 @@ class _Classes:
                 default = name
         type_name = self._type_name_of(identifier, described.type_name)
         python_class: type[enum.IntEnum] = _INT_ENUM(class_name(type_name, "Enum"), values, module=MODULE)
-        describe_enum(python_class, type_name=type_name, bit_bound=described.bit_bound, default=default)
+        describe_enum(
+            python_class,
+            type_name=type_name,
+            bit_bound=described.bit_bound,
+            default=default,
+            extensibility=_enumerated_extensibility(described.flags),
+        )
         return python_class
 
     def _bitmask(self, identifier: HashedIdentifier, described: BitmaskObject) -> type[Any]:
@@ -305,7 +311,12 @@ class _Classes:
             values[name] = 1 << flag.position
         type_name = self._type_name_of(identifier, described.type_name)
         python_class: type[enum.IntFlag] = _INT_FLAG(class_name(type_name, "Bitmask"), values, module=MODULE)
-        describe_bitmask(python_class, type_name=type_name, bit_bound=described.bit_bound)
+        describe_bitmask(
+            python_class,
+            type_name=type_name,
+            bit_bound=described.bit_bound,
+            extensibility=_enumerated_extensibility(described.flags),
+        )
         return python_class
 
     def _bitset(self, identifier: HashedIdentifier, described: BitsetObject) -> type[Any]:
@@ -384,6 +395,12 @@ def _extensibility(flags: TypeFlag) -> Extensibility:
     if found is None:
         raise BadParameter("it is of two kinds of extensibility at once")
     return found
+
+
+def _enumerated_extensibility(flags: TypeFlag) -> Extensibility:
+    """That of an enum or a bitmask, of which vendors also say nothing, or that it is mutable."""
+    is_open = flags & (TypeFlag.APPENDABLE | TypeFlag.MUTABLE)
+    return Extensibility.APPENDABLE if is_open else Extensibility.FINAL
 
 
 def _sensible(limits: Limits) -> list[Limits]:

@@ -6,7 +6,7 @@ import enum
 from typing import Any
 
 from ..structure.errors import BadParameter
-from .model import BitmaskType, EnumType
+from .model import BitmaskType, EnumType, Extensibility
 
 __all__ = ["bitmask_from", "bitmask_type", "describe_bitmask", "describe_enum", "enum_type"]
 
@@ -22,12 +22,18 @@ def enum_type(python_class: type[enum.IntEnum]) -> EnumType:
 
 
 def describe_enum(
-    python_class: type[enum.IntEnum], *, type_name: str | None = None, bit_bound: int = 32, default: str | None = None
+    python_class: type[enum.IntEnum],
+    *,
+    type_name: str | None = None,
+    bit_bound: int = 32,
+    default: str | None = None,
+    extensibility: Extensibility = Extensibility.FINAL,
 ) -> EnumType:
     name = python_class.__name__
     if not (isinstance(python_class, type) and issubclass(python_class, enum.IntEnum)):
         raise BadParameter(f"{name}: idl.enum decorates an enum.IntEnum")
     _check_bit_bound(name, bit_bound, 32)
+    _check_extensibility(name, extensibility)
     literals = list(python_class)
     if not literals:
         raise BadParameter(f"{name}: an enum has one literal at least")
@@ -38,6 +44,7 @@ def describe_enum(
         type_name or name,
         bit_bound,
         literals[0] if default is None else python_class[default],
+        extensibility,
     )
     limit = 2 ** (8 * described.size - 1)
     for literal in literals:
@@ -54,16 +61,21 @@ def bitmask_type(python_class: type[enum.IntFlag]) -> BitmaskType:
 
 
 def describe_bitmask(
-    python_class: type[enum.IntFlag], *, type_name: str | None = None, bit_bound: int = 32
+    python_class: type[enum.IntFlag],
+    *,
+    type_name: str | None = None,
+    bit_bound: int = 32,
+    extensibility: Extensibility = Extensibility.FINAL,
 ) -> BitmaskType:
     name = python_class.__name__
     if not (isinstance(python_class, type) and issubclass(python_class, enum.IntFlag)):
         raise BadParameter(f"{name}: idl.bitmask decorates an enum.IntFlag")
     _check_bit_bound(name, bit_bound, 64)
+    _check_extensibility(name, extensibility)
     for flag in python_class:
         if flag.value >= 2**bit_bound:
             raise BadParameter(f"{name}.{flag.name}: bit {flag.value.bit_length() - 1} is not one of {bit_bound}")
-    described = BitmaskType(python_class, type_name or name, bit_bound)
+    described = BitmaskType(python_class, type_name or name, bit_bound, extensibility)
     _attach(python_class, described)
     return described
 
@@ -88,6 +100,11 @@ def bitmask_from(python_class: type[enum.IntFlag], number: int) -> enum.IntFlag:
 def _check_bit_bound(name: str, bit_bound: int, most: int) -> None:
     if isinstance(bit_bound, bool) or not isinstance(bit_bound, int) or not 1 <= bit_bound <= most:
         raise BadParameter(f"{name}: bit_bound is a number from 1 to {most}, not {bit_bound!r}")
+
+
+def _check_extensibility(name: str, extensibility: Extensibility) -> None:
+    if extensibility not in (Extensibility.FINAL, Extensibility.APPENDABLE):
+        raise BadParameter(f"{name}: extensibility is idl.FINAL or idl.APPENDABLE, not {extensibility!r}")
 
 
 def _attach(python_class: type[Any], described: EnumType | BitmaskType) -> None:

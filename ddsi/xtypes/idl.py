@@ -373,28 +373,38 @@ def bitset(*, typename: str | None = None) -> Callable[[type[_C]], type[_C]]:
 
 
 def enum(
-    *, typename: str | None = None, bit_bound: int = 32, default: str | None = None
+    *,
+    typename: str | None = None,
+    bit_bound: int = 32,
+    default: str | None = None,
+    extensibility: Extensibility = FINAL,
 ) -> Callable[[type[_E]], type[_E]]:
     """Say more of an ``IntEnum`` than its literals: the type name, ``@bit_bound`` (1 to 32), ``@default_literal``.
 
-    Without this decorator any ``enum.IntEnum`` is an IDL enum of 32 bits whose first literal is the default.
+    ``extensibility``: ``idl.APPENDABLE`` where literals may be added later, so that programs with fewer of them still
+    match (DDS-XTypes 1.3 §7.2.3).  Without this decorator any ``enum.IntEnum`` is a final IDL enum of 32 bits whose
+    first literal is the default.
     """
 
     def decorate(python_class: type[_E]) -> type[_E]:
-        describe_enum(python_class, type_name=typename, bit_bound=bit_bound, default=default)
+        describe_enum(
+            python_class, type_name=typename, bit_bound=bit_bound, default=default, extensibility=extensibility
+        )
         return python_class
 
     return decorate
 
 
-def bitmask(*, typename: str | None = None, bit_bound: int = 32) -> Callable[[type[_F]], type[_F]]:
-    """Say more of an ``IntFlag`` than its flags: the type name, ``@bit_bound`` (1 to 64).
+def bitmask(
+    *, typename: str | None = None, bit_bound: int = 32, extensibility: Extensibility = FINAL
+) -> Callable[[type[_F]], type[_F]]:
+    """Say more of an ``IntFlag`` than its flags: the type name, ``@bit_bound`` (1 to 64), and that it is appendable.
 
-    Without this decorator any ``enum.IntFlag`` is an IDL bitmask of 32 bits.
+    Without this decorator any ``enum.IntFlag`` is a final IDL bitmask of 32 bits.
     """
 
     def decorate(python_class: type[_F]) -> type[_F]:
-        describe_bitmask(python_class, type_name=typename, bit_bound=bit_bound)
+        describe_bitmask(python_class, type_name=typename, bit_bound=bit_bound, extensibility=extensibility)
         return python_class
 
     return decorate

@@ -153,6 +153,8 @@ class EnumType:
     type_name: str
     bit_bound: int
     default: enum.IntEnum
+    extensibility: Extensibility = Extensibility.FINAL
+    """Whether literals may be added; the encoding is the same.  Final where nothing is said, as in Cyclone DDS."""
 
     @property
     def size(self) -> int:
@@ -173,6 +175,7 @@ class BitmaskType:
     python_class: type[enum.IntFlag]
     type_name: str
     bit_bound: int
+    extensibility: Extensibility = Extensibility.FINAL
 
     @property
     def size(self) -> int:

@@ -89,6 +89,17 @@ FITS = [
         "@appendable union U switch (long) { default: long d; }; " + members("U u;"),
         "@appendable union U switch (long) { case 7: long a; default: long d; }; " + members("U u;"),
     ),
+    # what is marked as key inside a member that is none is no key
+    (
+        "@appendable struct P { @key string<3> x; long y; }; " + members("P a; sequence<P> b;"),
+        "@appendable struct P { string<4> x; @key long y; @key long z; }; " + members("P a; sequence<P> b;"),
+    ),
+    (
+        "@appendable union U switch (@key long) { case 1: long a; }; " + members("U u;"),
+        "@appendable union U switch (long) { case 1: long a; }; " + members("U u;"),
+    ),
+    ("@appendable enum E { A }; " + members("E e;"), "@appendable enum E { A, B }; " + members("E e;")),
+    ("@appendable enum E { A, B }; " + members("@key E e;"), "@appendable enum E { A }; " + members("@key E e;")),
     # To Cyclone DDS 0.10 a uint8 is an octet; and a bitmask travels as one.
     (members("octet a; sequence<uint8> b;"), members("uint8 a; sequence<octet> b;")),
     ("@bit_bound(8) bitmask M { x }; " + members("M m;"), members("octet m;")),
@@ -142,6 +153,24 @@ DIFFERS = [
         members("@key string a;"),
         "a",
         "the reader takes 5 at most, the writer may send any",
+    ),
+    (
+        "struct P { @key long x; long y; }; " + members("@key P p;"),
+        "struct P { @key long x; @key long y; }; " + members("@key P p;"),
+        "p.y",
+        "it is part of the key in the writer's type only",
+    ),
+    (
+        "struct P { @key string<5> x; string<5> y; }; " + members("@key P p;"),
+        "struct P { @key string<6> x; string<6> y; }; " + members("@key P p;"),
+        "p.x",
+        "the reader takes 5 at most, the writer may send 6",
+    ),
+    (
+        "@appendable enum E { A }; " + members("@key E e;"),
+        "@appendable enum E { A, B }; " + members("@key E e;"),
+        "e",
+        "it is key, and the reader does not know the literal B",
     ),
     # enums
     (ENUM.format(32, "A, B"), ENUM.format(16, "A, B"), "e", "enums of 32 and of 16 bits"),

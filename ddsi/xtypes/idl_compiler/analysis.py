@@ -135,6 +135,7 @@ class _Analysis(CompositeAnalysis):
         annotations = Annotations(node.annotations, self.lookup, self.warnings)
         bit_bound = annotations.number("bit_bound", 1, 32) or 32
         enum = EnumDeclaration(self.path(node.name), node.place, node.comment, bit_bound=bit_bound)
+        enum.extensibility = annotations.enumerated_extensibility()
         declare(self.scope, enum)
         limit = 1 << (8 if bit_bound <= 8 else 16 if bit_bound <= 16 else 32) - 1
         values: dict[int, str] = {}
@@ -166,6 +167,7 @@ class _Analysis(CompositeAnalysis):
         annotations = Annotations(node.annotations, self.lookup, self.warnings)
         bit_bound = annotations.number("bit_bound", 1, 64) or 32
         bitmask = BitmaskDeclaration(self.path(node.name), node.place, node.comment, bit_bound=bit_bound)
+        bitmask.extensibility = annotations.enumerated_extensibility()
         position = -1
         for flag in node.flags:
             own = Annotations(flag.annotations, self.lookup, self.warnings)

@@ -126,6 +126,11 @@ class Annotations:
         word = self._word("extensibility", [extensibility.name for extensibility in Extensibility])
         return Extensibility[word] if word is not None else found
 
+    def enumerated_extensibility(self) -> Extensibility:
+        """That of an enum or a bitmask: final where nothing is said, and mutable ones are appendable, as in idlc."""
+        found = self.extensibility(Extensibility.FINAL)
+        return found if found is Extensibility.FINAL else Extensibility.APPENDABLE
+
     def is_hashed(self, *, default: bool) -> bool:
         """``@autoid``, ``@autoid(HASH)`` or ``@autoid(SEQUENTIAL)``."""
         annotation = self._by_name.get("autoid")

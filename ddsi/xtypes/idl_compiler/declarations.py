@@ -133,6 +133,7 @@ class EnumDeclaration(Declaration):
     literals: list[Enumerator] = field(default_factory=list)
     bit_bound: int = 32
     default: Enumerator | None = None
+    extensibility: Extensibility = Extensibility.FINAL
 
 
 @dataclass(eq=False, slots=True)
@@ -141,6 +142,7 @@ class BitmaskDeclaration(Declaration):
 
     flags: dict[str, int] = field(default_factory=dict)
     bit_bound: int = 32
+    extensibility: Extensibility = Extensibility.FINAL
 
 
 @dataclass(frozen=True, slots=True)

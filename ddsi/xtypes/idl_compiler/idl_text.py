@@ -23,6 +23,7 @@ from ..model import (
     Case,
     Composite,
     EnumType,
+    Extensibility,
     IdlType,
     MapType,
     Member,
@@ -223,7 +224,7 @@ class _Writer:
         return [*self._blocks, (_module(named), [*self._typedefs, *lines])]
 
     def _enum(self, type_: EnumType) -> list[str]:
-        lines = [f"@bit_bound({type_.bit_bound})"] if type_.bit_bound != 32 else []
+        lines = _enumerated_marks(type_)
         lines.append(f"enum {_escaped(_path(type_)[-1])} {{")
         literals = list(type_.python_class)
         due = 0
@@ -236,7 +237,7 @@ class _Writer:
         return [*lines, "};"]
 
     def _bitmask(self, type_: BitmaskType) -> list[str]:
-        lines = [f"@bit_bound({type_.bit_bound})"] if type_.bit_bound != 32 else []
+        lines = _enumerated_marks(type_)
         lines.append(f"bitmask {_escaped(_path(type_)[-1])} {{")
         flags = list(type_.python_class)
         if not flags:
@@ -459,6 +460,12 @@ def _type_marks(type_: Composite) -> list[str]:
         names = [representation.name for representation in type_.representations]
         marks.append(f"@data_representation({' | '.join(names)})")
     return [" ".join(marks)]
+
+
+def _enumerated_marks(type_: EnumType | BitmaskType) -> list[str]:
+    marks = [f"@{type_.extensibility.value}"] if type_.extensibility is not Extensibility.FINAL else []
+    marks += [f"@bit_bound({type_.bit_bound})"] if type_.bit_bound != 32 else []
+    return [" ".join(marks)] if marks else []
 
 
 def _is_sayable(value: Any) -> bool:

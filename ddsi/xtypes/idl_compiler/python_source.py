@@ -177,6 +177,7 @@ class PythonSource:
         options += [f"bit_bound={enum.bit_bound}"] if enum.bit_bound != 32 else []
         if enum.default is not None:
             options.append(f"default={quoted(literal_identifier(enum.default.name))}")
+        options += _extensibility_unless_final(enum)
         lines = [laid_out(call("@idl.enum", options), "")] if options else []
         lines += [f"class {name}(enum.IntEnum):", *self._documentation(enum)]
         for literal in enum.literals:
@@ -186,6 +187,7 @@ class PythonSource:
     def _bitmask(self, bitmask: BitmaskDeclaration, name: str) -> list[str]:
         options = _typename(bitmask, name)
         options += [f"bit_bound={bitmask.bit_bound}"] if bitmask.bit_bound != 32 else []
+        options += _extensibility_unless_final(bitmask)
         lines = [laid_out(call("@idl.bitmask", options), "")] if options else []
         lines += [f"class {name}(enum.IntFlag):", *self._documentation(bitmask)]
         return [*lines, *(f"{_INDENT}{literal_identifier(flag)} = 1 << {at}" for flag, at in bitmask.flags.items())]
@@ -323,6 +325,12 @@ def _is_class(alias: Alias) -> bool:
 
 def _typedef(alias: Alias) -> Expression:
     return f"idl.typedef({quoted(alias.scoped_name)})"
+
+
+def _extensibility_unless_final(declaration: EnumDeclaration | BitmaskDeclaration) -> list[str]:
+    if declaration.extensibility is Extensibility.FINAL:
+        return []
+    return [f"extensibility={_EXTENSIBILITIES[declaration.extensibility]}"]
 
 
 def _typename(declaration: Declaration, name: str) -> list[Expression]:

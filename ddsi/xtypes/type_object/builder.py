@@ -180,7 +180,7 @@ class _Builder:
             case BitmaskType():
                 bits = {flag.value.bit_length() - 1: literal_name_in_idl(str(flag.name)) for flag in type_.python_class}
                 bitflags = tuple(BitflagObject(position, named(bits[position])) for position in sorted(bits))
-                return BitmaskObject(TypeFlag.FINAL, type_.bit_bound, bitflags, name)
+                return BitmaskObject(_EXTENSIBILITIES[type_.extensibility], type_.bit_bound, bitflags, name)
             case BitsetType():
                 return BitsetObject(
                     tuple(
@@ -332,4 +332,4 @@ def _enum(enum: EnumType) -> EnumObject:
         )
         for literal in sorted(enum.python_class)
     )
-    return EnumObject(TypeFlag.FINAL, enum.bit_bound, literals, enum.type_name)
+    return EnumObject(_EXTENSIBILITIES[enum.extensibility], enum.bit_bound, literals, enum.type_name)

@@ -44,10 +44,11 @@ class _Comparison:
             case EnumType(), EnumType():
                 literals = [{literal.name: literal.value for literal in type_.python_class} for type_ in (one, other)]
                 names = [type_.default.name for type_ in (one, other)]
-                return self._values(one, other, "type_name", "bit_bound") or _unlike(*literals) or _unlike(*names)
+                values = self._values(one, other, "type_name", "bit_bound", "extensibility")
+                return values or _unlike(*literals) or _unlike(*names)
             case BitmaskType(), BitmaskType():
                 flags = [{flag.name: flag.value for flag in type_.python_class} for type_ in (one, other)]
-                return self._values(one, other, "type_name", "bit_bound") or _unlike(*flags)
+                return self._values(one, other, "type_name", "bit_bound", "extensibility") or _unlike(*flags)
             case BitsetType(), BitsetType():
                 return self._values(one, other, "type_name", "fields") or self.types(one.base, other.base)
             case (StructType(), StructType()) | (UnionType(), UnionType()):

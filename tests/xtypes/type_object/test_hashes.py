@@ -157,6 +157,23 @@ def test_what_hashid_was_given_is_told() -> None:
     assert read.members == written.members
 
 
+def test_enums_and_bitmasks_may_be_appendable() -> None:
+    """The hashes are those of cyclonedds-python 11.0.1.  Where nothing is said both are final to it."""
+    namespace: Any = ddsi.idl.loads(
+        "@appendable enum E { A, B, @value(9) C };"
+        "@appendable @bit_bound(8) bitmask M { F, @position(5) G }; @final struct T { E e; M m; };"
+    )
+    ours = ddsi.type_information(namespace.T)
+    assert (ours.minimal.hex(), ours.complete.hex()) == ("507eaba2dc18a023fa488f2ff29b", "ce554f0c69eff9b7f62292e8c61c")
+    again = ddsi.dynamic_type(ddsi.type_objects(namespace.T))
+    assert ddsi.type_information(again).complete == ours.complete
+    said = ddsi.idl.loads(ddsi.idl.to_idl(again))
+    assert ddsi.type_information(said.T).complete == ours.complete
+    final: Any = ddsi.idl.loads("enum E { A }; bitmask M { F }; struct T { E e; M m; };")
+    marked: Any = ddsi.idl.loads("@final enum E { A }; @final bitmask M { F }; struct T { E e; M m; };")
+    assert ddsi.type_information(final.T).complete == ddsi.type_information(marked.T).complete
+
+
 # --- on the wire -----------------------------------------------------------------------------------------------------
 
 FINAL_SHAPE = "@final struct ShapeType { @key string<128> color; long x; long y; long shapesize; };"
