@@ -63,9 +63,7 @@ class Qos:
 
     def __post_init__(self) -> None:
         if not isinstance(self.properties, Mapping):
-            raise BadParameter(
-                f"Qos(properties=...) takes a dict of names and values, not {type(self.properties).__name__}"
-            )
+            raise BadParameter(f"Qos(properties=...) takes a dict, not a {type(self.properties).__name__}")
         for item in fields(self):
             value = getattr(self, item.name)
             allowed = _ALLOWED.get(item.name)
