@@ -45,7 +45,8 @@ class Scratch:
         return memoryview(self._octets)[:length]
 
     def wipe(self) -> None:
-        self._octets = bytearray()
+        """What was decrypted last is not to be found in memory any more."""
+        self._octets[:] = bytes(len(self._octets))
 
 
 def append_encrypted(buffer: bytearray, plain: Octets, aead: AESGCM, nonce: bytes, *, spare: int) -> bytes:

@@ -64,7 +64,7 @@ class LocalParticipant(ParticipantCryptoHandle):
         return self._last_key_id.to_bytes(4, "big")
 
     def wipe(self) -> None:
-        _wipe(self.key)
+        _wipe(self.key, *self.scratch)
         self.key = None
 
     def __repr__(self) -> str:
@@ -255,7 +255,7 @@ class RemoteWriter(DatawriterCryptoHandle):
         return f"<RemoteWriter {self.ring!r}, payload {self.payload_ring!r}>"
 
 
-def _wipe(*keys: SendingKey | ReceiverKey | KeyRing | None) -> None:
-    for key in keys:
-        if key is not None:
-            key.wipe()
+def _wipe(*secrets: SendingKey | ReceiverKey | KeyRing | Scratch | None) -> None:
+    for secret in secrets:
+        if secret is not None:
+            secret.wipe()

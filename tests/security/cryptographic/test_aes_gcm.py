@@ -47,3 +47,11 @@ def test_decrypting_joins_cipher_text_and_tag(size: int, kind: type) -> None:
     assert encrypted == sealed[:-16], "what came is left as it was"
     with pytest.raises(InvalidTag):
         aes_gcm.decrypt_joined(AEAD, NONCE, encrypted, 0, len(encrypted), bytes(16), scratch)
+
+
+def test_what_was_decrypted_last_can_be_wiped() -> None:
+    scratch = aes_gcm.Scratch()
+    room = scratch.room(100)
+    room[:] = b"x" * 100
+    scratch.wipe()
+    assert not any(room)
