@@ -358,8 +358,14 @@ def union(
     return decorate if python_class is None else decorate(python_class)
 
 
+@overload
 @dataclass_transform()
-def bitset(*, typename: str | None = None) -> Callable[[type[_C]], type[_C]]:
+def bitset(python_class: type[_C], /) -> type[_C]: ...
+@overload
+@dataclass_transform()
+def bitset(*, typename: str | None = None) -> Callable[[type[_C]], type[_C]]: ...
+@dataclass_transform()
+def bitset(python_class: type[Any] | None = None, /, *, typename: str | None = None) -> Any:
     """Make a class an IDL bitset: fields of some bits each, ``Annotated[idl.uint8, idl.bits(3)]``, all 0 by default.
 
     A base class that is a bitset is the IDL base.  Raises BadParameter naming the field.
@@ -369,16 +375,28 @@ def bitset(*, typename: str | None = None) -> Callable[[type[_C]], type[_C]]:
     def decorate(undecorated: type[Any]) -> type[Any]:
         return define_bitset(undecorated, type_name=typename, frame=frame)
 
-    return decorate
+    return decorate if python_class is None else decorate(python_class)
 
 
+@overload
+def enum(python_class: type[_E], /) -> type[_E]: ...
+@overload
 def enum(
     *,
     typename: str | None = None,
     bit_bound: int = 32,
     default: str | None = None,
     extensibility: Extensibility = FINAL,
-) -> Callable[[type[_E]], type[_E]]:
+) -> Callable[[type[_E]], type[_E]]: ...
+def enum(
+    python_class: type[Any] | None = None,
+    /,
+    *,
+    typename: str | None = None,
+    bit_bound: int = 32,
+    default: str | None = None,
+    extensibility: Extensibility = FINAL,
+) -> Any:
     """Say more of an ``IntEnum`` than its literals: the type name, ``@bit_bound`` (1 to 32), ``@default_literal``.
 
     ``extensibility``: ``idl.APPENDABLE`` where literals may be added later, so that programs with fewer of them still
@@ -386,28 +404,39 @@ def enum(
     first literal is the default.
     """
 
-    def decorate(python_class: type[_E]) -> type[_E]:
+    def decorate(enumeration: type[_E]) -> type[_E]:
         describe_enum(
-            python_class, type_name=typename, bit_bound=bit_bound, default=default, extensibility=extensibility
+            enumeration, type_name=typename, bit_bound=bit_bound, default=default, extensibility=extensibility
         )
-        return python_class
+        return enumeration
 
-    return decorate
+    return decorate if python_class is None else decorate(python_class)
 
 
+@overload
+def bitmask(python_class: type[_F], /) -> type[_F]: ...
+@overload
 def bitmask(
     *, typename: str | None = None, bit_bound: int = 32, extensibility: Extensibility = FINAL
-) -> Callable[[type[_F]], type[_F]]:
+) -> Callable[[type[_F]], type[_F]]: ...
+def bitmask(
+    python_class: type[Any] | None = None,
+    /,
+    *,
+    typename: str | None = None,
+    bit_bound: int = 32,
+    extensibility: Extensibility = FINAL,
+) -> Any:
     """Say more of an ``IntFlag`` than its flags: the type name, ``@bit_bound`` (1 to 64), and that it is appendable.
 
     Without this decorator any ``enum.IntFlag`` is a final IDL bitmask of 32 bits.
     """
 
-    def decorate(python_class: type[_F]) -> type[_F]:
-        describe_bitmask(python_class, type_name=typename, bit_bound=bit_bound, extensibility=extensibility)
-        return python_class
+    def decorate(flags: type[_F]) -> type[_F]:
+        describe_bitmask(flags, type_name=typename, bit_bound=bit_bound, extensibility=extensibility)
+        return flags
 
-    return decorate
+    return decorate if python_class is None else decorate(python_class)
 
 
 def load(
@@ -424,7 +453,7 @@ def load(
     ``default_extensibility`` holds where the text says none (other compilers: final, for instance, in Cyclone DDS's).
     What was left out, such as unknown annotations, is told in its ``idl_warnings``.
 
-    Raises IdlError, with file, line, column and what was expected; OSError if the file cannot be read.
+    Raises IdlError, with file, line, column and what was expected; OSError if the file cannot be read; BadParameter.
     """
     from .idl_compiler.loading import load_file
 

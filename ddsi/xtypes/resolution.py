@@ -55,6 +55,9 @@ _MAPS = (dict, collections.abc.Mapping, collections.abc.MutableMapping)
 
 _SEQUENCES = (list, collections.abc.Sequence, collections.abc.MutableSequence)
 
+_MARKERS = ("key", "optional", "must_understand", "external", "non_serialized")
+"""Those that stand alone in ``Annotated``, and are easily put between quotes."""
+
 
 class Scope(Protocol):
     """Where local names are looked up: the frame around a class, or what stands for one where there is no source."""
@@ -148,6 +151,8 @@ class Resolver:
             type_ = SequenceType(element.type, numpy=_is_numpy(self._evaluate(base), element.type))
             resolved = Resolved(type_, typedefs=_of_parts(element.typedefs))
         for marker in markers:
+            if isinstance(marker, str) and marker in _MARKERS:  # other texts are for other readers (PEP 593)
+                raise BadParameter(f"{marker!r} is a text, which says nothing here; idl.{marker} is meant")
             self._mark(resolved, marker)
         return resolved
 
@@ -299,7 +304,7 @@ def _why_not(annotation: Any, origin: Any) -> str:
     if annotation is Any:
         return "Any says no type"
     if isinstance(annotation, typing.TypeVar):
-        return f"{shown} is a type variable, and an IDL type has none"
+        return f"{shown} is a type variable, as of a bare idl.sequence; say of what: idl.sequence[...]"
     if annotation in _MAPS or origin in _MAPS:
         return f"{shown} does not say of what; use idl.map[key, value]"
     if annotation in _SEQUENCES or origin in _SEQUENCES:

@@ -298,9 +298,11 @@ def _set_discriminator(self: Any, value: Any) -> None:
     self._idl_discriminator = value
 
 
-def _init(self: Any, /, **given: Any) -> None:
+def _init(self: Any, /, *positional: Any, **given: Any) -> None:
     union = union_type(type(self))
     name = type(self).__name__
+    if positional:
+        raise TypeError(f"{name} takes its one member by name, as {name}({union.cases[0].name}=...)")
     switch = union.discriminator.name
     members = {case.name: case for case in union.cases}
     chosen = [key for key in given if key != switch]

@@ -234,7 +234,9 @@ MEMBERS: dict[str, tuple[Any, str]] = {
     "bare list of typing": (typing.List, "List does not say of what; use idl.sequence[...]"),  # noqa: UP006
     "bare map of typing": (typing.Dict, "Dict does not say of what; use idl.map[key, value]"),  # noqa: UP006
     "any": (Any, "Any says no type"),
-    "type variable": (typing.TypeVar("T"), "T is a type variable, and an IDL type has none"),
+    "type variable": (typing.TypeVar("T"), "T is a type variable, "),
+    "bare sequence": (idl.sequence, "as of a bare idl.sequence; say of what: idl.sequence[...]"),
+    "marker in quotes": (Annotated[str, "key"], "'key' is a text, which says nothing here; idl.key is meant"),
     "set": (set[int], "set is no IDL type"),
     "literal": (typing.Literal[1], "Literal is no IDL type"),
     "complex": (complex, "complex is no IDL type"),
@@ -258,6 +260,33 @@ def test_members_that_cannot_be_are_refused_by_name(name: str) -> None:
     class_ = type("Wrong", (), {"__annotations__": {"fine": idl.int32, "odd": annotation}})
     with pytest.raises(BadParameter, match=r"Wrong\.odd: .*" + re.escape(reason)):
         idl.struct(class_)
+
+
+def test_texts_for_other_readers_of_annotations_are_let_alone() -> None:
+    class_ = type("Noted", (), {"__annotations__": {"x": Annotated[idl.int32, "in metres"]}})
+    assert types_of(idl.struct(class_)) == [INT32]
+
+
+def test_decorators_without_options_need_no_parentheses() -> None:
+    @idl.enum
+    class Color(enum.IntEnum):
+        RED = 0
+
+    @idl.bitmask
+    class Flags(enum.IntFlag):
+        UP = 1
+
+    @idl.bitset
+    class Bits:
+        low: Annotated[idl.uint8, idl.bits(3)]
+
+    @idl.struct
+    class All:
+        color: Color
+        flags: Flags
+        bits: Bits
+
+    assert deserialize(All, serialize(All(Color.RED, Flags.UP, Bits(5)))) == All(Color.RED, Flags.UP, Bits(5))
 
 
 def test_a_struct_may_be_empty_but_no_element_of_a_sequence() -> None:

@@ -69,6 +69,12 @@ def test_a_member_selects_its_discriminator() -> None:
     assert idl.selected_member(Maybe(there=False)) is None
 
 
+def test_a_member_by_position_is_refused_with_what_to_write() -> None:
+    make: Any = Shade
+    with pytest.raises(TypeError, match=r"Shade takes its one member by name, as Shade\(grey=\.\.\.\)"):
+        make(5)
+
+
 def test_without_a_member_there_are_the_defaults() -> None:
     assert Shade() == Shade(grey=0)
     assert Shade(color=Color.BLUE) == Shade(names=[])

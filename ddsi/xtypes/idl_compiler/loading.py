@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...structure.errors import BadParameter
 from ..model import Extensibility
 from .analysis import analyze
 from .declarations import Compilation, Module
@@ -52,7 +53,13 @@ def compile_idl(
     defines: Mapping[str, str],
     default_extensibility: Extensibility,
 ) -> Compilation:
-    """Everything up to the declarations.  Raises IdlError."""
+    """Everything up to the declarations.  Raises IdlError; BadParameter for options that cannot be meant."""
+    if isinstance(include, (str, Path)):
+        raise BadParameter(f"include is a list of folders, as [{str(include)!r}]")
+    if not isinstance(default_extensibility, Extensibility):
+        raise BadParameter(
+            f"default_extensibility is idl.FINAL, idl.APPENDABLE or idl.MUTABLE, not {default_extensibility!r}"
+        )
     preprocessor = Preprocessor([Path(folder) for folder in include], defines)
     parser = Parser(preprocessor.tokens(source, path))
     definitions = parser.specification()
@@ -77,6 +84,8 @@ def load_file(path: str | Path, **options: Any) -> Namespace:
 
 def load_text(text: str, **options: Any) -> Namespace:
     """See :func:`ddsi.idl.loads`."""
+    if not isinstance(text, str):
+        raise BadParameter(f"IDL text is a str, not {text!r}")
     return _run(compile_idl(SourceText("<text>", text.removeprefix("\ufeff")), None, **options), "<text>", "idl_text")
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from ddsi import DdsError, idl
+from ddsi import BadParameter, DdsError, idl
 
 ERRORS: dict[str, tuple[str, int, int, str]] = {
     # --- lexer
@@ -286,3 +287,21 @@ def test_an_error_in_a_macro_is_where_the_macro_is_used() -> None:
 def test_a_file_that_is_not_there_is_an_os_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         idl.load(tmp_path / "none.idl")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"include": "folder"}, r"include is a list of folders, as \['folder'\]"),
+        ({"default_extensibility": "final"}, "idl.FINAL, idl.APPENDABLE or idl.MUTABLE, not 'final'"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(BadParameter, match=said):
+        idl.loads("struct A { long x; };", **options)
+
+
+def test_what_is_no_text_is_refused() -> None:
+    anything: Any = Path("shapes.idl")
+    with pytest.raises(BadParameter, match="IDL text is a str, not "):
+        idl.loads(anything)
