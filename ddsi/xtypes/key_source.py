@@ -103,6 +103,8 @@ class _KeyFinder:
     def _key(self, type_: IdlType, path: _Path, *, is_last: bool) -> None:
         emitter = self._emitter
         match type_:
+            case BitsetType() if sum(field.width for field in type_.fields) < 8 * type_.size:
+                raise _NoExtractorError  # bits of no field may be anything, and are no part of the key
             case Primitive() | EnumType() | BitmaskType() | BitsetType():
                 emitter.align(self._encoding.alignment(type_.size))
                 self.found[path] = (emitter.item(type_.code, type_.size),)

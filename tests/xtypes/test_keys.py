@@ -275,3 +275,19 @@ def test_the_key_is_found_behind_a_parameter_list_that_has_grown() -> None:
 
     octets = type_support(After).serializer(DataRepresentationId.XCDR1)(After(LongLoose(9, 4), 5))
     assert type_support(Before).key_from_payload(octets) == b"\0\0\0\5"
+
+
+@pytest.mark.parametrize(("representation", "little_endian"), FORMS)
+def test_bits_of_no_field_are_no_part_of_the_key(representation: DataRepresentationId, little_endian: bool) -> None:
+    @idl.bitset()
+    class Bits:
+        low: Annotated[idl.uint8, idl.bits(3)]
+
+    @idl.struct(extensibility=idl.FINAL)
+    class Marked:
+        bits: Annotated[Bits, idl.key]
+
+    support = type_support(Marked)
+    octets = support.serializer(representation, little_endian)(Marked(Bits(5)))
+    noisy = octets[:4] + bytes([octets[4] | 0xF8]) + octets[5:]
+    assert support.key_from_payload(noisy) == support.key(Marked(Bits(5))) == support.key(support.deserialize(noisy))
