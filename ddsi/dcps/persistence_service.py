@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 from fnmatch import fnmatchcase
-from os import PathLike
+from os import PathLike, fspath
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -52,14 +52,16 @@ class PersistenceService:
         """``participant``: one that was entered, and does nothing else with these topics.  ``topics``: patterns, with
         ``*`` and ``?``, of the names of those that it serves.
 
-        Raises BadParameter, naming the file, where ``path`` is no store of a service, or another process has it open.
+        ``path``: of the file, which is made if there is none.  It is opened by ``async with``, which raises
+        BadParameter, naming it, where it is no store of a service, or another process has it open.
         """
         check_participant(participant)
         participant._running_pump()
         self._participant = participant
         self._patterns = topics
-        self._store = SampleStore(path)
-        self._store.forget(Transient.KIND)
+        self._path = fspath(path)
+        self._opened: SampleStore | None = None
+        self._was_entered = False
         self._topics: dict[StoredTopic, DurableTopic] = {}
         self.refusals: dict[StoredTopic, str] = {}
         """Topics that security does not let it serve, and why."""
@@ -68,10 +70,18 @@ class PersistenceService:
         self._nursery: trio.Nursery | None = None
 
     def __repr__(self) -> str:
-        return f"<PersistenceService of {len(self._topics)} topics in {self._store!r}>"
+        return f"<PersistenceService of {len(self._topics)} topics in {self._path}>"
+
+    @property
+    def _store(self) -> SampleStore:
+        if self._opened is not None:
+            return self._opened
+        if self._was_entered:
+            raise AlreadyDeleted(f"{self!r} has ended")
+        raise PreconditionNotMet(f"{self!r} has not opened its file yet: enter it first, by `async with`")
 
     def counts(self) -> dict[str, int]:
-        """How many samples it holds, by topic."""
+        """How many samples it holds, by topic.  Raises PreconditionNotMet before it is entered, then AlreadyDeleted."""
         found: dict[str, int] = {}
         for topic in self._store.topics():
             found[topic.name] = found.get(topic.name, 0) + self._store.count(topic)
@@ -79,7 +89,12 @@ class PersistenceService:
 
     @trio.lowlevel.enable_ki_protection
     async def __aenter__(self) -> Self:
+        if self._was_entered:
+            raise PreconditionNotMet(f"{self!r} was entered before; a PersistenceService is entered once, make another")
         await trio.lowlevel.checkpoint()
+        opened = SampleStore(self._path)
+        opened.forget(Transient.KIND)
+        self._was_entered, self._opened = True, opened
         await self._lifetime.enter()
         return self
 
@@ -94,6 +109,7 @@ class PersistenceService:
             for topic in self._topics.values():
                 topic.close()
             self._store.close()
+            self._opened = None
 
     async def _run(self) -> None:
         try:

@@ -182,11 +182,38 @@ async def test_samples_keep_their_source_timestamps(domain: int, tmp_path: Path)
 
 
 @in_trio
-async def test_a_file_that_is_none_of_its_own_is_refused(domain: int, tmp_path: Path) -> None:
-    (tmp_path / "letter").write_text("Dear reader. " * 400)
+async def test_a_file_that_is_none_of_its_own_is_refused_when_it_is_entered(domain: int, tmp_path: Path) -> None:
+    """And stays as it was; the same service may be entered when it is gone."""
+    letter = tmp_path / "letter"
+    letter.write_text("Dear reader. " * 400)
     async with ddsi.DomainParticipant(domain, config=config(announce_types=True)) as participant:
+        keeper = ddsi.PersistenceService(participant, letter)
         with pytest.raises(ddsi.BadParameter, match="letter"):
-            ddsi.PersistenceService(participant, tmp_path / "letter")
+            await keeper.__aenter__()
+        assert letter.read_text().startswith("Dear reader.")
+        letter.unlink()
+        async with keeper:
+            assert keeper.counts() == {}
+
+
+@in_trio
+async def test_one_that_is_never_entered_opens_no_file_and_says_so(domain: int, tmp_path: Path) -> None:
+    path = tmp_path / "samples"
+    async with ddsi.DomainParticipant(domain, config=config(announce_types=True)) as participant:
+        waiting = ddsi.PersistenceService(participant, path)
+        assert not path.exists()
+        with pytest.raises(ddsi.PreconditionNotMet, match="enter it first"):
+            waiting.counts()
+        other = ddsi.PersistenceService(participant, path)
+        async with other:
+            with pytest.raises(ddsi.BadParameter, match="no other process uses"):
+                await waiting.__aenter__()
+        with pytest.raises(ddsi.AlreadyDeleted, match="has ended"):
+            other.counts()
+        with pytest.raises(ddsi.PreconditionNotMet, match="entered once"):
+            await other.__aenter__()
+        async with waiting:
+            assert waiting.counts() == {}
 
 
 def _values(samples: list[ddsi.Sample[Shape]]) -> list[int]:
