@@ -9,6 +9,7 @@ deserialising is done when a sample is taken, by whoever takes it.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
@@ -83,6 +84,7 @@ class ReaderHistoryCache:
         self._clock_offset = clock_offset
         self._on_news = on_news
         self._on_rejected = on_rejected
+        self._on_timer = on_timer
         self._has_news = self._is_available = False
         self.arrivals: Iterator[int] | None = None  # numbers the samples of several readers as they come
         self.is_withholding = False  # did a reliable writer's sample find no room?
@@ -138,6 +140,9 @@ class ReaderHistoryCache:
         if self._by_source and source_order.comes_too_late(instance, change, self._depth):
             return True
         if self._depth and len(samples) - instance.end_count >= self._depth:
+            octets = len(change.payload)
+            if self._octets + octets > self._max_octets and self._outgrows(instance, octets):
+                return self._no_room("octets of history", change)
             self._push_out(instance)
         else:
             limit = self._limit_reached(instance, len(change.payload))
@@ -275,6 +280,16 @@ class ReaderHistoryCache:
             return "octets of history"
         return None
 
+    def _outgrows(self, instance: Instance, octets: int) -> bool:
+        """Does a sample need more room than the one whose place it would take, and there is none?
+
+        Else many instances that each had a small sample once could hold any number of octets.
+        """
+        oldest = self._oldest(instance).change
+        assert oldest is not None
+        others = self._octets - len(oldest.payload)
+        return bool(others) and octets > len(oldest.payload) and others + octets > self._max_octets
+
     def lacks_room_for(self, changes: Sequence[CacheChange], *, when_empty: bool = False) -> str | None:
         """The limit that forbids taking all of these now, or ``when_empty``, by name; None if there is room."""
         samples = octets = 0
@@ -321,7 +336,11 @@ class ReaderHistoryCache:
 
     def _push_out(self, instance: Instance) -> None:
         """KEEP_LAST: the oldest sample with data goes.  What tells of an end stays; there is one such at most."""
-        self._remove(instance, next(info for info in instance.samples if info.valid_data))
+        self._remove(instance, self._oldest(instance))
+
+    @staticmethod
+    def _oldest(instance: Instance) -> SampleInfo:
+        return next(info for info in instance.samples if info.valid_data)
 
     def _remove(self, instance: Instance, info: SampleInfo) -> None:
         """A sample makes room; its place in the order of arrival is tidied up later."""
@@ -357,6 +376,8 @@ class ReaderHistoryCache:
         """Nobody writes it and nothing is left to take: forget it, so that instances come and go without end."""
         if not instance.samples and not instance.writers and instance.state is not _ALIVE:
             self._instances.pop(instance.key, None)
+            if self.is_withholding:  # where nobody takes anything, nobody else would notice that there is room
+                self._on_timer(-math.inf)
 
     # --- what does not stay --------------------------------------------------------------------------------
 

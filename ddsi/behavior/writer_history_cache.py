@@ -8,12 +8,16 @@ counts; it knows no reader.  Invariants: numbers ascend by one per change and ar
 from __future__ import annotations
 
 from collections import deque
+from itertools import islice
 
-from ..structure.cache_change import CacheChange
+from ..structure.cache_change import CacheChange, ChangeKind
 from ..structure.qos import EndpointQos
 from ..structure.qos_policies import LENGTH_UNLIMITED, KeepLast
 
 __all__ = ["WriterHistoryCache"]
+
+_MOST_ENDED = 8192
+_LIMITS_ON_ALL = ("max_instances", "max_samples")
 
 
 class WriterHistoryCache:
@@ -24,6 +28,7 @@ class WriterHistoryCache:
         "_by_instance",
         "_changes",
         "_depth",
+        "_ended",
         "_first_sn",
         "_keeps_acknowledged",
         "_max_instances",
@@ -51,6 +56,8 @@ class WriterHistoryCache:
         # How many members of each coherent set are here, by the number of its first; and the number that ends it.
         self._set_sizes: dict[int, int] = {}
         self._set_ends: dict[int, int] = {}
+        # Instances that all know to be disposed and unregistered, in the order in which they ended.
+        self._ended: dict[bytes, None] = {}
         self._first_sn = 1
         self._acked_sn = 0
         self.last_sn = 0
@@ -93,6 +100,11 @@ class WriterHistoryCache:
         """
         if not self.keeps_instances:
             return "max_samples" if self._max_samples and len(self._changes) >= self._max_samples else None
+        if self._ended and self._limit_reached(key) in _LIMITS_ON_ALL:
+            self._forget_ended()
+        return self._limit_reached(key)
+
+    def _limit_reached(self, key: bytes) -> str | None:
         instance = self._by_instance.get(key)
         if self._max_instances and instance is None and len(self._by_instance) >= self._max_instances:
             return "max_instances"
@@ -120,6 +132,8 @@ class WriterHistoryCache:
         instance = self._by_instance.get(change.key)
         if instance is None:
             instance = self._by_instance[change.key] = deque()
+        if self._ended:
+            self._ended.pop(change.key, None)
         instance.append(sequence_number)
         return self._take_oldest(instance) if self._depth and len(instance) > self._depth else None
 
@@ -148,10 +162,31 @@ class WriterHistoryCache:
                 continue
             if self._keeps_acknowledged and not self._is_idle_end(change):
                 self.unacknowledged_octets -= len(change.payload)
+                if change.kind is ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED and self.keeps_instances:
+                    self._note_ended(change)
             else:
                 self.remove(number)
         self._acked_sn = max(self._acked_sn, min(sequence_number, self.last_sn))
+        if len(self._ended) > _MOST_ENDED:
+            self._forget_ended()
         return before - self.unacknowledged_octets
+
+    # --- instances that have ended -----------------------------------------------------------------------
+
+    def _note_ended(self, end: CacheChange) -> None:
+        if self._by_instance[end.key][-1] == end.sequence_number:
+            self._ended[end.key] = None
+
+    def _forget_ended(self) -> None:
+        """The instances that ended longest ago give way.  DDS 1.4 §2.2.2.4.2.7 (unregister_instance).
+
+        Their writer has nothing to say of them any more, and all readers know.  They are kept for a reader that was
+        lost without noticing it, and has to hear of the end when it is found again.
+        """
+        for key in list(islice(self._ended, max(len(self._ended) - _MOST_ENDED, 1))):
+            del self._ended[key]
+            for number in list(self._by_instance.get(key, ())):
+                self.remove(number)
 
     def _take_oldest(self, instance: deque[int]) -> CacheChange:
         change = self._changes[instance.popleft()]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..trace.reasons import SampleLossReason
 from .local_endpoints import LocalReader, LocalWriter
 
 if TYPE_CHECKING:
@@ -49,6 +50,16 @@ class LocalDelivery:
         writer_proxy.reorder.next_sn = number
         writer_proxy.last_seq = cache.last_sn
         writer.behavior.local_reader_progress(reader_proxy, number - 1, now)
+
+    def given_up(self, writer: LocalWriter, reader: LocalReader) -> None:
+        """The two are about to part: what the reader found no room for until now it will not get."""
+        proxy = reader.behavior.writers[writer.guid]
+        if proxy.next_sn > proxy.last_seq:
+            return
+        changes = writer.behavior.cache.changes()
+        left = [change for change in changes if proxy.next_sn <= change.sequence_number <= proxy.last_seq]
+        count = sum(not change.is_end_of_set for change in left)
+        self._engine.samples_lost(reader, proxy, count, proxy.next_sn, SampleLossReason.WRITER_LOST)
 
     def resume(self, reader: LocalReader, now: float) -> None:
         """There may be room for what a reader could not take."""

@@ -18,7 +18,7 @@ from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData,
 from ..structure.guid import Guid
 from ..structure.locator import Locator
 from ..structure.status import SecurityRefused
-from ..trace.reasons import LossReason
+from ..trace.reasons import LossReason, SampleLossReason
 from .content_filters import writer_side_filter
 from .local_endpoints import LocalReader, LocalWriter
 from .type_matching import TypeVerdict
@@ -319,6 +319,8 @@ class Matchmaker:
         if reader.history is not None:
             reader.history.writer_unmatched(guid, now)
             engine.presentation.writer_unmatched(reader, guid, reason, now)
+        if proxy is not None and proxy.is_reliable and not may_return and reason is not LossReason.CLOSED:
+            engine.samples_lost(reader, proxy, len(proxy.reorder), proxy.next_sn, SampleLossReason.WRITER_LOST)
         engine.status(reader.guid, reader.match_changed(guid, -1))
         alive = proxy is None or proxy.is_alive
         engine.status(
@@ -350,6 +352,8 @@ class Matchmaker:
 
     def _unmatch_local(self, writer: LocalWriter, reader: LocalReader, reason: LossReason, now: float) -> None:
         engine = self._engine
+        if reason is not LossReason.CLOSED or writer.guid in engine.closing:
+            engine.local_delivery.given_up(writer, reader)
         writer.behavior.matched_reader_remove(reader.guid, now)
         proxy = reader.behavior.matched_writer_remove(writer.guid, now)
         alive = proxy is None or proxy.is_alive

@@ -94,6 +94,7 @@ __all__ = ["Participant", "ParticipantSetup"]
 _LOSS_TEXT = {
     SampleLossReason.BEST_EFFORT: "skipped by a best-effort stream",
     SampleLossReason.NOT_AVAILABLE: "the writer no longer has it",
+    SampleLossReason.WRITER_LOST: "the writer was gone before there was room for it",
 }
 _FLUSH_AFTER_S = 0.001
 _LINGER_S = 1.0
@@ -399,7 +400,8 @@ class Participant:
             return
         self.closing.add(writer.guid)
         behavior = writer.behavior
-        if behavior.is_reliable and behavior.readers and behavior.min_acked_sn() < behavior.cache.last_sn:
+        has_readers = behavior.readers or behavior.local_readers
+        if behavior.is_reliable and has_readers and behavior.min_acked_sn() < behavior.cache.last_sn:
             self.alarms.linger(writer.guid, now + _LINGER_S)
             self.writer_answers(writer, behavior.request_acknowledgment())
         else:
@@ -620,7 +622,9 @@ class Participant:
     def samples_lost(
         self, reader: LocalReader, proxy: WriterProxy, count: int, first: int, why: SampleLossReason
     ) -> None:
-        """Numbers that will never be delivered to this reader."""
+        """Numbers that will never be delivered to this reader, if there are any."""
+        if not count:
+            return
         self.status(reader.guid, reader.samples_lost(count, _LOSS_TEXT[why]))
         self.recorder.samples_lost(reader.guid, proxy.guid, first, first + count - 1, why)
 

@@ -126,7 +126,7 @@ class SampleLossReason(StrEnum):
     INCOMPLETE = "incomplete"
     """Fragments were given up: too old, or the table was full."""
     WRITER_LOST = "writer_lost"
-    """The writer went before they could be repaired."""
+    """The writer went before they could be repaired, or before there was room for them."""
     INCOMPLETE_SET = "incomplete_set"
     """They came, but not all of their coherent set did, or there was no room for it."""
     REJECTED_BY_SECURITY = "rejected_by_security"

@@ -363,6 +363,37 @@ def test_octets_are_bounded_with_keep_last_too() -> None:
     assert cache.put(b"\0", octets=40), "a sample that replaces another needs no room"
 
 
+@pytest.mark.parametrize("reliability", [Reliable(), BestEffort()])
+def test_a_sample_larger_than_the_one_that_it_replaces_needs_room(reliability: Reliable | BestEffort) -> None:
+    """Else a hundred thousand instances that had a small sample each could hold any number of octets."""
+    cache = Cache(Qos(history=KeepLast(1), reliability=reliability), max_octets=100)
+    for key in b"abc":
+        assert cache.put(bytes((key,)), octets=30)
+    assert cache.put(b"a", octets=41) is isinstance(reliability, BestEffort)
+    assert (cache.octets, cache.rejected) == (90, ["octets of history"])
+    assert cache.put(b"a", octets=40), "so much room there is"
+    assert cache.put(b"a", octets=20), "and for a smaller one always"
+    cache.take()
+    assert cache.put(b"a", octets=60)
+    assert cache.put(b"a", octets=500), "one sample always fits, or it could never be had"
+
+
+def test_an_instance_that_goes_by_itself_makes_room() -> None:
+    """Where the application took all samples there is nothing to take that would show it."""
+    due: list[float] = []
+    limits = ResourceLimits(max_instances=1)
+    qos = reader_qos(Qos(history=KeepAll(), reliability=Reliable(), resource_limits=limits))
+    cache = ReaderHistoryCache(qos, max_octets=100, max_instances=9, on_timer=due.append)
+    for number, kind in enumerate((ChangeKind.ALIVE, DISPOSE)):
+        assert cache.add(CacheChange(kind, W1, number, b"", b"a"), now=1.0)
+    cache.take()
+    assert not cache.add(CacheChange(ChangeKind.ALIVE, W2, 1, b"", b"b"), now=1.0)
+    assert (cache.is_withholding, due) == (True, [])
+    cache.add(CacheChange(UNREGISTER, W1, 3, b"", b"a"), now=2.0)
+    assert due
+    assert due[0] <= 2.0
+
+
 def test_limits_on_samples_hold_with_keep_last_too() -> None:
     cache = Cache(Qos(history=KeepLast(1), reliability=Reliable(), resource_limits=ResourceLimits(max_samples=2)))
     assert [cache.put(key) for key in (b"a", b"b", b"c")] == [True, True, False]

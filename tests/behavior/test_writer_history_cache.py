@@ -7,12 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddsi.behavior.writer_history_cache import WriterHistoryCache
-from ddsi.structure.cache_change import CacheChange
+from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.qos import Qos, writer_qos
 from ddsi.structure.qos_policies import KeepAll, KeepLast, ResourceLimits, TransientLocal, Volatile
-from tests.behavior.builders import change
+from tests.behavior.builders import change, guid
 
 KEEP_ALL = Qos(history=KeepAll())
+ENDED = ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED
 
 
 def cache(qos: Qos = KEEP_ALL) -> WriterHistoryCache:
@@ -116,6 +117,41 @@ def test_room_comes_back_with_acknowledgment() -> None:
     assert whc.lacks_room(b"b") is not None
     whc.acknowledged_up_to(1)
     assert whc.lacks_room(b"b") is None
+
+
+def test_an_instance_that_has_ended_gives_way_when_all_know() -> None:
+    """DDS 1.4 §2.2.2.4.2.7: who unregisters an instance has nothing to say of it any more."""
+    limits = ResourceLimits(max_instances=2)
+    whc = cache(Qos(history=KeepLast(2), durability=TransientLocal(), resource_limits=limits))
+    fill(whc, b"a", b"b", b"a")
+    whc.add(CacheChange(ENDED, guid(1), 4, b"end", b"a"))
+    whc.acknowledged_up_to(3)
+    assert (whc.lacks_room(b"c"), held(whc)) == ("max_instances", [2, 3, 4])
+    whc.acknowledged_up_to(4)
+    assert held(whc) == [2, 3, 4], "a late joiner, or who comes back, may hear of the end while there is room"
+    assert (whc.lacks_room(b"c"), held(whc)) == (None, [2])
+    assert (whc.octets, whc.unacknowledged_octets) == (10, 0)
+
+
+def test_an_instance_that_is_written_again_does_not_give_way() -> None:
+    limits = ResourceLimits(max_instances=1)
+    whc = cache(Qos(history=KeepLast(1), durability=TransientLocal(), resource_limits=limits))
+    for number in (1, 3):
+        fill(whc, b"a")
+        assert whc.lacks_room(b"b") == "max_instances"
+        whc.add(CacheChange(ENDED, guid(1), number + 1, b"", b"a"))
+        whc.acknowledged_up_to(number + 1)
+    fill(whc, b"a")
+    whc.acknowledged_up_to(5)
+    assert (whc.lacks_room(b"b"), held(whc)) == ("max_instances", [5])
+
+
+def test_instances_that_have_ended_are_bounded() -> None:
+    whc = cache(Qos(history=KeepLast(1), durability=TransientLocal()))
+    for number in range(1, 10_001):
+        whc.add(CacheChange(ENDED, guid(1), number, b"", number.to_bytes(4)))
+        whc.acknowledged_up_to(number)
+    assert held(whc) == list(range(10_001 - 8192, 10_001))
 
 
 def test_one_change_can_be_removed() -> None:

@@ -359,6 +359,20 @@ async def test_a_publisher_that_is_closed_sends_what_it_kept(domain: int) -> Non
         await eventually(lambda: all(reader.read(max_samples=1) for reader in s.readers))
 
 
+@pytest.mark.parametrize("local", [True, False])
+@in_trio
+async def test_a_writer_that_is_closed_meanwhile_sends_what_it_kept(domain: int, local: bool) -> None:
+    async with stage(domain, Presentation(), local=local) as s:
+        s.publisher.suspend_publications()
+        for number in range(3):
+            await s.writers[0].write(Shape("RED", number))
+        s.writers[0].close()
+        await eventually(lambda: s.held() == 4)
+        samples = s.readers[0].take()
+        assert numbers([sample for sample in samples if sample.info.valid_data]) == [0, 1, 2]
+        assert samples[-1].info.instance_state is ddsi.InstanceState.NOT_ALIVE_DISPOSED
+
+
 @in_trio
 async def test_a_publisher_waits_for_the_acknowledgments_of_all_its_writers(domain: int) -> None:
     async with stage(domain, Presentation()) as s:

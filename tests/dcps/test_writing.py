@@ -184,6 +184,77 @@ async def test_max_instances_is_a_limit_too(domain: int) -> None:
             await writer.write(Shape("GREEN"))
 
 
+@pytest.mark.parametrize("local", [True, False])
+@in_trio
+async def test_an_instance_that_is_unregistered_makes_room_for_another(domain: int, local: bool) -> None:
+    limits = RELIABLE | ddsi.Qos(
+        history=ddsi.KeepLast(1),
+        reliability=ddsi.Reliable(max_blocking_time=0.5),
+        resource_limits=ddsi.ResourceLimits(max_instances=2),
+        durability=ddsi.TransientLocal(),
+    )
+    async with pair(domain, writer=limits, local=local) as p:
+        for number in range(5):
+            await p.writer.write(Shape(f"C{number}"))
+            await p.writer.unregister(Shape(f"C{number}"))
+        await p.writer.write(Shape("A"))
+        await p.writer.write(Shape("B"))
+        await eventually(lambda: len(p.reader._history) == 12)
+        with pytest.raises(ddsi.DdsTimeout, match="max_instances"):
+            await p.writer.write(Shape("C"))
+
+
+# --- readers that are full when the writer goes -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("local", [True, False])
+@in_trio
+async def test_a_writer_that_is_closed_lets_a_full_reader_take_the_rest(domain: int, local: bool) -> None:
+    async with pair(domain, reader=limited(2), local=local) as p:
+        for number in range(5):
+            await p.writer.write(Shape("RED", number))
+        p.writer.close()
+        samples = [await anext(p.reader) for _ in range(6)]
+        assert [sample.data.x for sample in samples if sample.info.valid_data] == list(range(5))
+        await eventually(lambda: not p.reader.matched_publications())
+        assert p.reader.status(ddsi.SampleLost).total_count == 0
+
+
+@pytest.mark.parametrize("local", [True, False])
+@in_trio
+async def test_what_a_full_reader_had_no_room_for_when_the_match_ended_is_lost(domain: int, local: bool) -> None:
+    async with pair(domain, reader=limited(2), local=local) as p:
+        for number in range(5):
+            await p.writer.write(Shape("RED", number))
+        held = [] if local else list(p.reader._reader.behavior.writers.values())
+        await eventually(lambda: all(len(proxy.reorder) == 3 for proxy in held))
+        p.reader.set_qos(ddsi.Qos(partition=ddsi.Partition("elsewhere")))
+        await eventually(lambda: not p.reader.matched_publications())
+        lost = p.reader.status(ddsi.SampleLost)
+        assert (lost.total_count, lost.reason) == (3, "the writer was gone before there was room for it")
+        valid = [sample.data.x for sample in p.reader.take() if sample.info.valid_data]
+        assert valid == [0, 1]
+
+
+@pytest.mark.parametrize("local", [True, False])
+@in_trio
+async def test_an_instance_that_ends_unseen_makes_room_for_another(domain: int, local: bool) -> None:
+    """Its samples were taken before its writer unregistered it, so nobody takes anything when it goes."""
+    limits = RELIABLE | ddsi.Qos(resource_limits=ddsi.ResourceLimits(max_instances=1))
+    async with pair(domain, writer=RELIABLE | NOT_DISPOSED, reader=limits, local=local) as p:
+        other = ddsi.DataWriter(p.here, p.writer.topic, RELIABLE)
+        await p.reader.wait_for_matched(2)
+        await other.wait_for_matched()
+        await p.writer.write(Shape("RED"))
+        await p.writer.dispose(Shape("RED"))
+        await p.writer.wait_for_acknowledgments(5)
+        assert len(p.reader.take()) == 2
+        await other.write(Shape("BLUE", 1))
+        await eventually(lambda: p.reader._history.is_withholding)
+        await p.writer.unregister(Shape("RED"))
+        assert (await anext(p.reader)).data == Shape("BLUE", 1)
+
+
 # --- the end of instances --------------------------------------------------------------------------------
 
 
