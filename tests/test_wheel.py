@@ -86,6 +86,8 @@ class TestWheel:
         assert metadata["Requires-Python"] == ">=3.11"
         assert metadata["License-Expression"] == "Apache-2.0"
         assert metadata["License-File"] == "LICENSE"
+        assert metadata["Description-Content-Type"] == "text/markdown"
+        assert str(metadata.get_payload()).startswith("# ddsi\n")
 
     def test_the_core_needs_trio_alone(self, metadata: email.message.Message) -> None:
         required = metadata.get_all("Requires-Dist", [])

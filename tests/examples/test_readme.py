@@ -35,6 +35,15 @@ def test_its_program_runs_as_printed_and_prints_what_is_shown(tmp_path: Path) ->
     assert output_of(program) == fenced("text")[0].splitlines()
 
 
+def test_its_program_without_trio_runs_with_the_type_of_the_first(tmp_path: Path) -> None:
+    first, without_trio, *_ = fenced("python")
+    definitions, main, _ = first.partition("async def main")
+    assert main
+    program = tmp_path / "program.py"
+    program.write_text(definitions + without_trio, encoding="utf-8")
+    assert output_of(program) == fenced("text")[0].splitlines()
+
+
 def test_its_program_is_the_first_example() -> None:
     example = (EXAMPLES / "01_hello.py").read_text(encoding="utf-8")
     module = ast.parse(example)
