@@ -8,7 +8,7 @@ told in :mod:`ddsi.behavior.filtered`; this is its writer's side.  It differs fr
 - ``lst_seq`` says how far that reader was sent something, and every HEARTBEAT is directed and speaks of that alone.  It
   stops when the reader has acknowledged ``lst_seq``, whatever the others lack;
 - a change is kept until the readers it is for have it.  Who does not answer fills up his own share of the history,
-  which is bounded, and never the others' (:meth:`FilteringWriter.has_overflow`).
+  which is bounded, and never the others' (:meth:`FilteringWriter.is_given_up`).
 """
 
 from __future__ import annotations
@@ -25,10 +25,14 @@ from .reader_proxy import ReaderProxy
 from .stateful_writer import StatefulWriter, WriterSettings
 from .transmissions import SendHeartbeat, WriterTransmission
 
-__all__ = ["MAX_CHANGES_PER_DESTINATION", "FilteringWriter"]
+__all__ = ["MAX_CHANGES_PER_DESTINATION", "MAX_CHANGES_UNDER_WAY", "FilteringWriter"]
 
 MAX_CHANGES_PER_DESTINATION = 256
-"""What one destination may leave unacknowledged; a handshake and its keys take less than ten."""
+"""What one destination may leave unacknowledged.  Who goes on acknowledging may be sent more (a key for each pair of
+endpoints: two large participants have thousands), up to MAX_CHANGES_UNDER_WAY."""
+MAX_CHANGES_UNDER_WAY = 8192
+_SILENCE_S = 10.0
+"""As long as a participant's lease usually is: who is there acknowledges sooner, whatever the network loses."""
 
 
 class FilteringWriter(StatefulWriter):
@@ -38,6 +42,8 @@ class FilteringWriter(StatefulWriter):
         super().__init__(guid, qos, **settings)
         # The numbers in the cache by destination, ascending.  A dict serves as an ordered set.
         self._held: dict[Guid, dict[int, None]] = {}
+        # Of destinations that overflow: the lowest of these when that was seen last to have changed, and when.
+        self._lowest: dict[Guid, tuple[int, float]] = {}
 
     def lacks_room(self, octets: int, key: bytes) -> str | None:
         """Only resource limits hold a write back: octets that one reader leaves unacknowledged are not the others'
@@ -46,8 +52,21 @@ class FilteringWriter(StatefulWriter):
         return f"resource limit {reason}" if reason is not None else None
 
     def has_overflow(self, destination: Guid) -> bool:
-        """Does this destination hold as many unacknowledged changes as one may?  Then it has to be given up."""
+        """Does this destination hold as many unacknowledged changes as one may?"""
         return len(self._held.get(destination, ())) >= MAX_CHANGES_PER_DESTINATION
+
+    def is_given_up(self, destination: Guid, now: float) -> bool:
+        """It overflows, and has not acknowledged anything for a while.  Asked before each change for it."""
+        if not self.has_overflow(destination):
+            self._lowest.pop(destination, None)
+            return False
+        held = self._held[destination]
+        lowest = next(iter(held))
+        known, since = self._lowest.get(destination, (0, now))
+        if known != lowest:
+            since = now
+            self._lowest[destination] = (lowest, now)
+        return now - since >= _SILENCE_S or len(held) >= MAX_CHANGES_UNDER_WAY
 
     def new_change(
         self,
@@ -178,6 +197,7 @@ class FilteringWriter(StatefulWriter):
         del numbers[change.sequence_number]
         if not numbers:
             del self._held[change.destination]
+            self._lowest.pop(change.destination, None)
 
     def _readers_of(self, change: CacheChange) -> list[ReaderProxy]:
         proxies = (*self.readers.values(), *self.local_readers.values())

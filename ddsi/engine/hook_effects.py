@@ -79,7 +79,7 @@ class HookEffects:
     def _send_generic_message(self, writer: LocalWriter, change: CacheChange) -> None:
         """What the hooks have to tell another participant; one that never acknowledges is given up."""
         engine, destination, behavior = self._engine, change.destination, writer.behavior
-        if isinstance(behavior, FilteringWriter) and behavior.has_overflow(destination):
+        if isinstance(behavior, FilteringWriter) and behavior.is_given_up(destination, engine.now):
             engine.discovery.participant_lost(destination, LossReason.UNRESPONSIVE, engine.now)
             return
         engine.write(writer, change.kind, bytes(change.payload), change.key, engine.now, destination=destination)

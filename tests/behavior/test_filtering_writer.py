@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ddsi.behavior.filtered import gap_before, gap_for, is_irrelevant
-from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION, FilteringWriter
+from ddsi.behavior.filtering_writer import MAX_CHANGES_PER_DESTINATION, MAX_CHANGES_UNDER_WAY, FilteringWriter
 from ddsi.behavior.reader_proxy import ReaderProxy
 from ddsi.behavior.transmissions import SendHeartbeat
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
@@ -239,6 +239,29 @@ def test_the_history_is_bounded_per_reader_and_blocks_nobody_else() -> None:
     assert len(held(writer)) == MAX_CHANGES_PER_DESTINATION
     writer.matched_reader_remove(A, 0.0)
     assert not writer.has_overflow(A.participant)
+
+
+def test_who_goes_on_acknowledging_is_not_given_up() -> None:
+    """Two large participants have a key for each of thousands of pairs to send at once."""
+    writer = make_writer()
+    a = match(writer, A)
+    for number in range(1, 2 * MAX_CHANGES_PER_DESTINATION):
+        send(writer, A)
+        if number > MAX_CHANGES_PER_DESTINATION:
+            assert not writer.is_given_up(A.participant, now=9.0 * number)
+            acknack(writer, a, number - MAX_CHANGES_PER_DESTINATION + 1, count=number)
+    last = 9.0 * (2 * MAX_CHANGES_PER_DESTINATION - 1)
+    send(writer, A, A)
+    assert not writer.is_given_up(A.participant, now=last + 1.0), "it has acknowledged since it was asked about last"
+    assert not writer.is_given_up(A.participant, now=last + 10.9)
+    assert writer.is_given_up(A.participant, now=last + 11.0)
+
+
+def test_nobody_may_be_sent_without_end_what_he_does_not_acknowledge() -> None:
+    writer = make_writer()
+    match(writer, A)
+    send(writer, *[A] * MAX_CHANGES_UNDER_WAY)
+    assert writer.is_given_up(A.participant, now=0.0)
 
 
 def test_what_has_expired_is_announced_no_more() -> None:
