@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 
-__all__ = ["add_domain", "add_json", "add_listening", "count", "domain_id", "octets", "seconds"]
+__all__ = ["add_domain", "add_json", "add_listening", "count", "domain_id", "octets", "rate", "seconds"]
 
 _HIGHEST_DOMAIN = 232
+_HIGHEST_RATE_HZ = 10_000.0
 DEFAULT_LISTENING_S = 2.0
 """Long enough for a participant that answers our announcement at once, as all vendors do."""
 
@@ -41,12 +42,19 @@ def domain_id(text: str) -> int:
 
 def seconds(text: str) -> float:
     """A finite duration above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = _number(text)
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"a number of seconds above 0 is wanted, not {text!r}")
+    return value
+
+
+def rate(text: str) -> float:
+    """So many a second, above 0."""
+    value = _number(text)
+    if not 0 < value <= _HIGHEST_RATE_HZ:
+        raise argparse.ArgumentTypeError(
+            f"a number of samples a second is wanted, above 0 and at most {_HIGHEST_RATE_HZ:g}, not {text!r}"
+        )
     return value
 
 
@@ -64,6 +72,13 @@ def octets(text: str) -> int:
     if number < 0:
         raise argparse.ArgumentTypeError(f"a number of octets is wanted, not {text!r}")
     return number
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _integer(text: str) -> int:

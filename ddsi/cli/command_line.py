@@ -30,6 +30,7 @@ _COMMANDS = {
     "idl": "make Python types from an IDL file",
     "demo": "show live data flowing between processes on this host",
     "doctor": "check interfaces, sockets, multicast, buffers and configuration",
+    "bench": "measure this stack beside the C-backed Python binding, and print ratios",
 }
 """The subcommands of this room, each a module of its name, with the line that ``ddsi --help`` gives it."""
 
@@ -132,7 +133,10 @@ def _add_foreign(subparsers: argparse._SubParsersAction[_Parser], chosen: str) -
     """Subcommands of installed packages: the chosen one is returned; for the help, all are asked for their line."""
     found: Command | None = None
     for entry_point in metadata.entry_points(group=ENTRY_POINT_GROUP):
-        if entry_point.name in _COMMANDS or (chosen and entry_point.name != chosen):
+        if entry_point.name in subparsers.choices:
+            continue
+        if chosen and entry_point.name != chosen:
+            subparsers.add_parser(entry_point.name)  # named where the chosen one is not known
             continue
         try:
             command: Command = entry_point.load()

@@ -16,7 +16,7 @@ from ..structure.errors import DdsTimeout
 from ..structure.qos import Qos
 from ..trace.wording import count_text
 from ..xtypes import type_support
-from .arguments import octets, seconds
+from .arguments import octets, rate
 from .exit_status import CommandError, ExitStatus
 from .fitting_qos import common_partition, offered_to
 from .runner import run as run_async
@@ -31,7 +31,6 @@ IS_INTERMIXED = True
 """Options may stand between topic and values."""
 
 _ACKNOWLEDGMENT_S = 5.0
-_HIGHEST_RATE_HZ = 10_000.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,19 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="field=value, with paths such as pose.points[2].x, or JSON in braces; what is not said has its default",
     )
     parser.add_argument(
-        "--rate", type=_rate, metavar="HZ", help="so many a second, until --count or Ctrl+C (default: one in all)"
+        "--rate", type=rate, metavar="HZ", help="so many a second, until --count or Ctrl+C (default: one in all)"
     )
     parser.add_argument(
         "--wait", type=octets, default=1, metavar="N", help="begin when so many readers are matched (default: 1)"
     )
     parser.add_argument("--at-end", choices=("dispose", "unregister"), help="what becomes of the instance")
-
-
-def _rate(text: str) -> float:
-    hertz = seconds(text)
-    if hertz > _HIGHEST_RATE_HZ:
-        raise argparse.ArgumentTypeError(f"at most {_HIGHEST_RATE_HZ:g} samples a second, not {text}")
-    return hertz
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -36,7 +36,7 @@ from ..structure.status import (
     Status,
     SubscriptionMatched,
 )
-from .arguments import add_domain, count, octets, seconds
+from .arguments import add_domain, count, octets, rate, seconds
 from .exit_status import CommandError, ExitStatus
 from .runner import run as run_async
 from .shape_display import FieldDisplay, LineDisplay, ShapeDisplay
@@ -53,7 +53,6 @@ _DEFAULT_COLOURS = ("BLUE",)
 _ACKNOWLEDGMENT_S = 5.0
 _BLOCKING_S = 10.0
 _RATE_HZ = 20.0
-_HIGHEST_RATE_HZ = 10_000.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--time", type=seconds, metavar="SECONDS", help="end after so long")
     parser.add_argument(
-        "--rate", type=_rate, default=_RATE_HZ, metavar="HZ", help=f"pub: samples a second (default: {_RATE_HZ:g})"
+        "--rate", type=rate, default=_RATE_HZ, metavar="HZ", help=f"pub: samples a second (default: {_RATE_HZ:g})"
     )
     parser.add_argument("--size", type=count, default=30, metavar="N", help="pub: the shape's size (default: 30)")
     parser.add_argument(
@@ -128,13 +127,6 @@ def _property(text: str) -> tuple[str, str]:
     if not (name and equals):
         raise argparse.ArgumentTypeError(f"a property is NAME=VALUE, not {text!r}")
     return name, value
-
-
-def _rate(text: str) -> float:
-    hertz = seconds(text)
-    if hertz > _HIGHEST_RATE_HZ:
-        raise argparse.ArgumentTypeError(f"at most {_HIGHEST_RATE_HZ:g} samples a second, not {text}")
-    return hertz
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -71,7 +71,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["ls", "--time", "nan"], "a number of seconds above 0 is wanted, not 'nan'; see ddsi ls --help\n"),
         (["shapes", "pub", "-n", "0"], "a number from 1 up is wanted, not '0'; see ddsi shapes --help\n"),
         (["shapes", "pub", "--payload", "-1"], "a number of octets is wanted, not '-1'; see ddsi shapes --help\n"),
-        (["shapes", "pub", "--rate", "1e9"], "at most 10000 samples a second, not 1e9; see ddsi shapes --help\n"),
+        (["shapes", "pub", "--rate", "1e9"], "above 0 and at most 10000, not '1e9'; see ddsi shapes --help\n"),
         (["sim", "--seed", "-3"], "a seed is a whole number from 0 up, not '-3'; see ddsi sim --help\n"),
         (["trace", "--only", "data,dta"], "remark, not 'data,dta'; see ddsi trace --help\n"),
         (["ls", "--nonsense"], "unrecognized arguments: --nonsense; see ddsi --help\n"),
@@ -178,3 +178,22 @@ def test_only_the_chosen_command_is_imported() -> None:
         "assert 'rich' not in sys.modules and 'cyclonedds' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60, stdout=subprocess.DEVNULL)
+
+
+def test_a_misspelt_command_is_answered_with_all_there_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Those of other packages too, and without importing them."""
+    _plug_in(monkeypatch, keystore=AssertionError("imported"))
+    with pytest.raises(SystemExit) as ended:
+        main(["keystor"])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert all(name in said for name in ("'keystor'", "keystore", *command_line._COMMANDS))
+
+
+@pytest.mark.parametrize("words", [["shapes", "pub", "--rate", "0"], ["pub", "T", "x=1", "--rate", "1e9"]])
+def test_a_rate_is_no_duration(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(words)
+    assert "samples a second" in capsys.readouterr().err
