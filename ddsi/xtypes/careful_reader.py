@@ -169,7 +169,7 @@ class _CarefulReader:
             case BitsetType():
                 return bitset_from(type_, self._number(type_.code, type_.size))
             case BitmaskType():
-                return bitmask_from(type_.python_class, self._number(type_.code, type_.size))
+                return self._flags(type_, self._number(type_.code, type_.size))
             case String(wide=True):
                 return self._wide_string(type_)
             case String():
@@ -196,6 +196,14 @@ class _CarefulReader:
             self._unfit(f"{raw} is no literal of {type_.type_name}")
             return type_.default
         return literal
+
+    def _flags(self, type_: BitmaskType, raw: int) -> Any:
+        """Unknown flags are kept, unless the class refuses them (``enum.STRICT``)."""
+        try:
+            return bitmask_from(type_.python_class, raw)
+        except ValueError:
+            self._unfit(f"{raw:#x} has flags that {type_.type_name} does not know")
+            return type_.python_class(0)
 
     def _string(self, type_: String) -> str:
         length = self._uint32()

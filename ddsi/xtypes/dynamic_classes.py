@@ -300,7 +300,10 @@ class _Classes:
         )
         return python_class
 
-    def _bitmask(self, identifier: HashedIdentifier, described: BitmaskObject) -> type[Any]:
+    def _bitmask(self, identifier: HashedIdentifier, described: BitmaskObject) -> type[Any] | None:
+        """None for one without flags: it is said as the integer that it travels as."""
+        if not described.bitflags:
+            return None
         values: dict[str, int] = {}
         for flag in described.bitflags:
             if flag.position >= 64:
@@ -359,6 +362,9 @@ class _Classes:
                 return _annotated(said, TypedefName(name)) if name else said
             case EnumObject(literals=(), bit_bound=bit_bound):
                 return idl.int8 if bit_bound <= 8 else idl.int16 if bit_bound <= 16 else idl.int32
+            case BitmaskObject(bitflags=(), bit_bound=bit_bound):
+                sizes = ((8, idl.uint8), (16, idl.uint16), (32, idl.uint32), (64, idl.uint64))
+                return next((said for bits, said in sizes if bit_bound <= bits), idl.uint64)
             case body:
                 collection = plain(identifier, body)
                 if collection is not identifier:

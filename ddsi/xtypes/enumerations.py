@@ -72,6 +72,8 @@ def describe_bitmask(
         raise BadParameter(f"{name}: idl.bitmask decorates an enum.IntFlag")
     _check_bit_bound(name, bit_bound, 64)
     _check_extensibility(name, extensibility)
+    if not list(python_class):
+        raise BadParameter(f"{name}: a bitmask has one flag at least")
     for flag in python_class:
         if flag.value >= 2**bit_bound:
             raise BadParameter(f"{name}.{flag.name}: bit {flag.value.bit_length() - 1} is not one of {bit_bound}")

@@ -345,6 +345,14 @@ def test_an_enum_without_literals_is_a_number() -> None:
     assert ddsi.serialize(sample).hex() == "00010000fd000000" + "02000000" + "01000000" + "00000040"
 
 
+def test_a_bitmask_without_flags_is_a_number() -> None:
+    masks = [BitmaskObject(FINAL, bits, (), "M") for bits in (3, 16, 17, 64)]
+    dynamic: Any = ddsi.dynamic_type(types_of(struct(*map(hash_of, (1, 2, 3, 4))), *masks))
+    octets = ddsi.serialize(dynamic(0xFF, 2, 3, 1 << 63), representation=ddsi.XCDR2)
+    assert octets.hex() == "00070000" + "ff00" + "0200" + "03000000" + "0000000000000080"
+    assert ddsi.deserialize(dynamic, octets) == dynamic(0xFF, 2, 3, 1 << 63)
+
+
 def test_collections_may_have_type_objects() -> None:
     dynamic: Any = ddsi.dynamic_type(
         types_of(struct(*map(hash_of, (1, 2, 3))), SequenceObject(INT32, 2), ArrayObject(INT32, (2, 2)),

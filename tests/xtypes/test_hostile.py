@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import pytest
 
-from ddsi.structure.errors import MalformedSample
+from ddsi.structure.errors import BadParameter, MalformedSample
 from ddsi.xtypes import deserialize, idl, serialize, type_support
 from ddsi.xtypes.enumerations import bitmask_from
 
@@ -200,6 +200,30 @@ def test_bits_without_a_flag_are_kept_but_not_remembered_for_ever() -> None:
     assert len(Many._value2member_map_) <= 4097
     assert bitmask_from(Many, 9_999) & Many.A == Many.A
     assert "9998" in repr(bitmask_from(Many, 9_998))
+
+
+def test_flags_that_a_strict_class_does_not_know_are_malformed() -> None:
+    class Strict(enum.IntFlag, boundary=enum.STRICT):
+        LOW = 1
+
+    @idl.struct()
+    class Flagged:
+        flags: Strict
+
+    assert deserialize(Flagged, b"\0\1\0\0\1\0\0\0") == Flagged(Strict.LOW)
+    with pytest.raises(MalformedSample, match="flags: 0x3 has flags that Strict does not know"):
+        deserialize(Flagged, b"\0\1\0\0\3\0\0\0")
+
+
+def test_a_bitmask_without_flags_is_refused() -> None:
+    class Nothing(enum.IntFlag):
+        pass
+
+    with pytest.raises(BadParameter, match="Flagged.flags: Nothing: a bitmask has one flag at least"):
+
+        @idl.struct()
+        class Flagged:
+            flags: Nothing
 
 
 def test_a_post_init_that_refuses_makes_the_sample_malformed() -> None:

@@ -336,7 +336,7 @@ class CompositeAnalysis:
             raise IdlError(node.place, f"{node.name} has no case; a union has one at least")
         default = next((member for member in union.members if member.is_default_case), None)
         values = len(bare.literals) if isinstance(bare, EnumDeclaration) else 2 if bare == model.BOOLEAN else 0
-        if default is not None and values and len(labels) == values:
+        if default is not None and not default.labels and values and len(labels) == values:
             raise IdlError(
                 default.place,
                 f"{default.name} is never chosen, as each value of the discriminator has a case of its own",

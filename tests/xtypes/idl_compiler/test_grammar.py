@@ -197,6 +197,11 @@ def test_a_byte_order_mark_is_no_text() -> None:
     assert list(idl.loads("\ufeffstruct T { long x; };")) == ["T"]
 
 
+def test_a_default_that_shares_its_case_may_be_one_of_all_labels() -> None:
+    types = idl.loads("union U switch (boolean) { case TRUE: long x; case FALSE: default: string y; };")
+    assert types.U(y="").discriminator is False
+
+
 def test_inheritance_continues_the_ids() -> None:
     types = idl.loads("struct A { @key long a; @id(5) long b; }; struct B : A { long c; };")
     assert [(found.name, found.id) for found in struct_type(types.B).members] == [("a", 0), ("b", 5), ("c", 6)]
