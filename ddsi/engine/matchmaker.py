@@ -293,7 +293,10 @@ class Matchmaker:
         self._note_matched(writer.guid, reader.guid, writer.data.topic_name)
         engine.status(writer.guid, writer.match_changed(reader.guid, 1))
         engine.status(reader.guid, reader.match_changed(writer.guid, 1))
-        engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=1, not_alive=0))
+        is_alive = writer_proxy.is_alive = not writer.has_lost_liveliness
+        engine.status(
+            reader.guid, reader.liveliness_changed(writer.guid, alive=int(is_alive), not_alive=int(not is_alive))
+        )
         engine.local_delivery.deliver(writer, reader, now)
 
     # --- the end of a pair -------------------------------------------------------------------------------

@@ -210,6 +210,18 @@ def test_a_dead_local_writer_that_is_unmatched_is_no_longer_counted() -> None:
     assert alive(reader) == (0, 0)
 
 
+@pytest.mark.parametrize("local", [False, True])
+def test_a_reader_that_comes_late_learns_that_a_writer_is_dead_and_that_it_revives(local: bool) -> None:
+    domain, writer, reader = matched(ManualByTopic(LEASE), local=local)
+    domain.run(2 * LEASE)
+    late = reader.node.reader("Square", Qos(liveliness=ManualByTopic(LEASE), history=KeepAll()), keyed=True)
+    domain.run(1.1 * LEASE)
+    assert (alive(reader), alive(late)) == ((0, 1), (0, 1))
+    assert_it(writer)
+    domain.run(LEASE / 2)
+    assert (alive(reader), alive(late)) == ((1, 0), (1, 0))
+
+
 def test_endless_leases_cost_nothing() -> None:
     domain = Domain()
     writer = domain.node().writer("Square", Qos(liveliness=ManualByTopic(math.inf)))
