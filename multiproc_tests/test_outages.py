@@ -63,8 +63,8 @@ SECURED = ("cable-pulled", "publisher-stopped")
 _NO_SECOND_HANDSHAKE = (
     "Fast DDS 2.9.1 does not notice that it stood still, and answers no second handshake; to itself neither"
 )
-"""No matter of luck: it stands still for longer than its lease, so it is forgotten each time.  A Fast DDS that passes has
-learnt it, and is then to be played like the others."""
+"""No matter of luck: it stands still for longer than its lease, so it is forgotten each time.  A Fast DDS that passes
+has learnt it, and is then to be played like the others."""
 
 
 def _pairs(outage: Outage, *, plays_all: bool) -> Iterator[tuple[Peer, Peer]]:
