@@ -20,11 +20,16 @@ agree on whether it ended: each judges by what it knows.  Therefore
   first only;
 * keys that come once more say that the peer has matched anew, and may have thrown ours away: it is sent ours again.
 
+The peer's keys may also have been lost here: they came too early and too many, or for an endpoint that was gone for a
+moment.  So who waits in vain sends its own again, which is how it asks for the other's.
+
 Only what a peer wrote under the key that the two share is looked at here, and it may speak for itself alone.
 """
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, Protocol
@@ -53,6 +58,9 @@ EARLY_KEYS_S: Final = 300.0
 """Cyclone DDS keeps them as long."""
 _ANSWER_AFTER_S: Final = 3.0
 """Keys that come sooner after ours were sent are the answer to ours.  Else two that match anew would never end."""
+_ASK_FIRST_S: Final = 5.0
+_MOST_ASKED: Final = 6
+"""Each time after twice as long: for five minutes in all, as long as keys are kept for."""
 
 
 CryptoHandle = DatawriterCryptoHandle | DatareaderCryptoHandle
@@ -76,6 +84,8 @@ class Pair:
     is_open: bool = False
     is_parted: bool = False
     sent_at: float = -math.inf
+    asking: int = 0
+    """Which of the timers is its."""
     remote_entity: bytes = b""
     """Its entity id."""
     is_volatile: bool = False
@@ -120,6 +130,9 @@ class KeyExchange:
         self.by_remote: dict[bytes, list[Pair]] = {}
         """The pairs of each remote endpoint, by its 16 octets."""
         self.by_handle: dict[CryptoHandle, Pair] = {}
+        # When to ask for keys: time, number of the timer, for which pair, how often it has asked.
+        self._timers: list[tuple[float, int, Pair, int]] = []
+        self._timer_numbers = itertools.count(1)
 
     # --- pairs -------------------------------------------------------------------------------------------
 
@@ -138,14 +151,38 @@ class KeyExchange:
         if not is_known and not local.is_volatile:
             self._send_keys(pair, now)
             self._use_early(pair, now)
+            if pair.needs_key and not pair.has_key:
+                self._ask_at(now, pair, 0)
         pair.is_open = self._is_complete(pair)
         return ADMITTED if pair.is_open else PENDING
+
+    def handle_timeout(self, now: float) -> None:
+        """Ask for the keys that do not come.  The first time only says what time it is: a match happens at no time."""
+        while self.next_deadline() <= now:
+            _, _, pair, asked = heapq.heappop(self._timers)
+            pair.asking = 0
+            if asked:
+                self._send_keys(pair, now)
+            if asked < _MOST_ASKED:
+                self._ask_at(now + _ASK_FIRST_S * 2**asked, pair, asked + 1)
+
+    def next_deadline(self) -> float:
+        while self._timers:
+            due, number, pair, _ = self._timers[0]
+            if pair.asking == number and not pair.has_key:
+                return due
+            heapq.heappop(self._timers)
+        return math.inf
+
+    def _ask_at(self, due: float, pair: Pair, asked: int) -> None:
+        pair.asking = next(self._timer_numbers)
+        heapq.heappush(self._timers, (due, pair.asking, pair, asked))
 
     def unmatch(self, local: Guid, remote: Guid) -> None:
         """The two are matched no more.  They may be again, so their keys are kept, and not used."""
         pair = self.pairs.get((local, remote))
         if pair is not None:
-            pair.is_open, pair.is_parted = False, True
+            pair.is_open, pair.is_parted, pair.asking = False, True, 0
 
     def remote_endpoint_lost(self, remote: Guid) -> None:
         """A peer's endpoint is gone: its keys are wiped."""
@@ -201,6 +238,7 @@ class KeyExchange:
 
     def _remove(self, pair: Pair) -> None:
         """Its keys are wiped."""
+        pair.asking = 0
         del self.pairs[pair.local.guid, pair.remote]
         others = self.by_remote[pair.remote]
         others.remove(pair)

@@ -208,6 +208,7 @@ class SecurityService:
         self._protection.changed()
         if local.entity_id == ids.PARTICIPANT_VOLATILE_MESSAGE_SECURE_WRITER:
             self._keys.send_participant_keys(participant)
+        self._rearm()
         return admission
 
     def _permitted(
@@ -284,6 +285,7 @@ class SecurityService:
             self._plugins.authentication.handle_timeout()
             self._plugins.access_control.handle_timeout()
         self._desk.handle_timeout(now)
+        self._keys.handle_timeout(now)
         self._rearm()
 
     def next_deadline(self) -> float:
@@ -310,7 +312,7 @@ class SecurityService:
         if wall:
             until = (min(wall) - self._wall_clock()) / 1e9
             self._wall_due = self._now + min(max(until, 0.0), _WALL_CLOCK_CHECK_S)
-        self._deadline = min(self._wall_due, self._desk.next_deadline())
+        self._deadline = min(self._wall_due, self._desk.next_deadline(), self._keys.next_deadline())
 
     def handshake_state(self, remote: GuidPrefix) -> State | None:
         """Where the handshake with this peer stands, for those who show it; None where there is none."""

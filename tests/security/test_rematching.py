@@ -6,6 +6,8 @@ may throw away at once what it was sent (Fast DDS does), or look at the first ke
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from ddsi.spi import ADMITTED, PENDING, Admission, NotForUs, Outcome
@@ -214,6 +216,46 @@ def test_another_reader_of_the_same_writer_hears_it_still(governance: str) -> No
     payload = bob.hooks.decode_payload(square.writer, alice.hooks.encode_payload(square.writer, PAYLOAD))
     assert not isinstance(payload, Outcome)
     assert bytes(payload) == PAYLOAD
+
+
+@pytest.mark.parametrize("who", BOTH)
+def test_who_waits_for_keys_in_vain_asks_for_them_ever_more_slowly(who: str) -> None:
+    """By sending its own again; the other thinks that all is well."""
+    square = Square()
+    asker, other = (square.alice, square.bob) if who == "writer" else (square.bob, square.alice)
+    square.part(who, forgets=True)
+    square.match(who)
+    asked_at = []
+    while (now := asker.hooks._keys.next_deadline()) < math.inf:
+        asker.act(now)
+        asker.under_way.clear()
+        asker.hooks.handle_timeout(now)
+        asker.act(now)
+        asked_at += [now] * len(asker.under_way)
+        answered = asker.under_way[-1:]
+    assert asked_at == [5.0, 15.0, 35.0, 75.0, 155.0, 315.0]
+    other.hooks.receive_message(answered[0].change, 315.0)
+    other.act(315.0)
+    asker.hooks.receive_message(other.under_way[0].change, 315.0)
+    asker.act(315.0)
+    assert square.is_admitted(who)
+    assert asker.hooks._keys.next_deadline() == math.inf
+
+
+@pytest.mark.parametrize("ends", ["answered", "parted", "gone"])
+def test_nobody_asks_who_waits_no_more(ends: str) -> None:
+    square = Square()
+    square.part("reader", forgets=True)
+    square.match("reader")
+    if ends == "answered":
+        deliver(square.alice, square.bob, now=LATER)
+    else:
+        square.part("reader", forgets=ends == "gone")
+    square.bob.act(LATER)
+    square.bob.under_way.clear()
+    square.bob.hooks.handle_timeout(2 * LATER)
+    square.bob.act(2 * LATER)
+    assert not square.bob.under_way
 
 
 @pytest.mark.parametrize("who", BOTH)

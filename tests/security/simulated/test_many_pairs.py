@@ -11,6 +11,7 @@ from ddsi.behavior import filtering_writer
 from ddsi.simulation import Domain, LinkConditions
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import KeepAll, Properties, Reliable
+from ddsi_security import key_exchange
 
 from .keystores import make_identities
 
@@ -41,3 +42,12 @@ def test_more_keys_than_one_peer_may_leave_unacknowledged_arrive(
     monkeypatch.setattr(filtering_writer, "MAX_CHANGES_PER_DESTINATION", BOUND)
     domain = crowded(identities, 1, loss)
     assert domain.run_until(domain.all_matched, 10.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_keys_that_came_before_their_endpoint_and_were_forgotten_are_asked_for(
+    identities: list[Properties], monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    monkeypatch.setattr(key_exchange, "MAX_EARLY_KEYS", 2)
+    domain = crowded(identities, seed, 0.2)
+    assert domain.run_until(domain.all_matched, 40.0)
