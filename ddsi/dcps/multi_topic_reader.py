@@ -199,8 +199,11 @@ class MultiTopicReader(SampleReader[T]):
         made.pop(combination, None)
         if not made:
             self._of_result.pop(key, None)
-            if self._support.is_keyed:
-                self._add(ChangeKind.NOT_ALIVE_DISPOSED, writer, key, ticks, self._support.sample_from_key(key))
+            instance = self._history.instances.get(key)
+            if self._support.is_keyed and instance is not None:
+                instance.writers.clear()  # whoever made it: when its end is taken nothing of it stays
+                data = self._support.sample_from_key(key)
+                self._add(ChangeKind.NOT_ALIVE_DISPOSED_UNREGISTERED, writer, key, ticks, data)
 
     def _add(self, kind: ChangeKind, writer: Guid, key: bytes, ticks: int, data: Any) -> None:
         self._number += 1

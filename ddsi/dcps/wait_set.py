@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import trio
 
-from ..structure.errors import BadParameter, DdsError, DdsTimeout, PreconditionNotMet
+from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from .conditions import Condition
 from .entity import deadline_scope
 
@@ -80,10 +80,11 @@ class WaitSet:
 
 
 def _may_hold(condition: Condition) -> bool:
-    """Is it worth looking?  What an entity that is closed has to say, the one who waits shall hear, and no task."""
+    """Is it worth looking?  What an entity that is closed, or a query, raises the one who waits shall hear, and no task
+    that would wrap it."""
     if condition._is_void:
         return True
     try:
         return condition.trigger_value
-    except DdsError:
+    except Exception:
         return True

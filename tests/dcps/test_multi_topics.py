@@ -184,6 +184,21 @@ async def test_waiting_iterating_and_conditions_are_as_with_any_reader(domain: i
 
 
 @in_trio
+async def test_rows_come_and_go_without_end(domain: int) -> None:
+    """Else the instances of the result would be used up, and no row be shown any more."""
+    async with stage(domain) as s:
+        reader = s.reader(TWO, "100")
+        for flight in range(5):
+            await s.write(Position(flight, 1), Plan(flight, "LH"))
+            await s.writers["Plan"].dispose(Plan(flight))
+            assert [sample.info.valid_data for sample in reader.take()] == [True, False]
+        assert not reader._history.instances
+        await s.write(Plan(4, "BA"))
+        (row,) = reader.take()
+        assert (row.data, row.info.instance_state) == (Seen(4, 1, "BA"), ddsi.InstanceState.ALIVE)
+
+
+@in_trio
 async def test_it_ends_with_its_readers_or_alone(domain: int) -> None:
     async with stage(domain) as here:
         reader = here.reader(TWO, "100")

@@ -249,6 +249,24 @@ async def test_who_waits_for_a_query_is_woken_by_its_new_parameters(domain: int)
 
 
 @in_trio
+async def test_what_a_query_raises_leaves_a_wait_set_as_itself(domain: int) -> None:
+    """Whenever the sample comes that it is asked about."""
+    for steps in range(4):
+        async with pair(domain, local=True) as p:
+            condition = ReadCondition(p.reader, query=lambda shape: bool(1 // shape.x))
+            async with trio.open_nursery() as nursery:
+
+                async def wait(condition: ReadCondition = condition) -> None:
+                    with pytest.raises(ZeroDivisionError):
+                        await WaitSet(condition).wait(5)
+
+                nursery.start_soon(wait)
+                for _ in range(steps):
+                    await trio.lowlevel.checkpoint()
+                await p.writer.write(Shape("RED", 0))
+
+
+@in_trio
 async def test_who_iterates_a_reader_that_is_not_enabled_gets_what_comes_when_it_is(domain: int) -> None:
     """Until it is enabled its policies may change altogether, which makes another reader of it inside."""
     manual = ddsi.Qos(entity_factory=ddsi.EntityFactory(autoenable_created_entities=False))
