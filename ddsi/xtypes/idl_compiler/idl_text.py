@@ -278,6 +278,8 @@ class _Writer:
 
     def _union(self, type_: UnionType) -> list[str]:
         name = _path(type_)[-1]
+        if not type_.cases:
+            raise BadParameter(f"{type_.type_name}: a union without cases cannot be said in IDL")
         discriminator, aliases = type_.discriminator.type, type_.discriminator.typedefs
         key = "@key " if type_.discriminator.is_key else ""
         lines = [

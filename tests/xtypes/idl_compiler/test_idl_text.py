@@ -16,6 +16,10 @@ from ddsi import BadParameter, idl
 from ddsi.xtypes.definition import struct_type
 from ddsi.xtypes.model import StructType, reachable_structs
 from ddsi.xtypes.resolution import named_type
+from ddsi.xtypes.type_object import BuiltTypes, HashIdentifier, TypeObject
+from ddsi.xtypes.type_object.identifiers import PrimitiveIdentifier
+from ddsi.xtypes.type_object.kinds import COMPLETE, MemberFlag, TypeFlag, TypeKind
+from ddsi.xtypes.type_object.objects import MemberObject, StructObject, UnionObject, named
 from tests.xtypes.random_types import structs
 
 from .same_types import difference
@@ -212,6 +216,18 @@ def test_what_idl_cannot_name_is_refused() -> None:
         idl.to_idl(Unnamed)
     with pytest.raises(BadParameter, match="'Unnamed' is no IDL type"):
         idl.to_idl("Unnamed")  # type: ignore[arg-type]
+
+
+def test_a_union_of_a_peer_without_cases_is_refused() -> None:
+    flags, number = MemberFlag.TRY_CONSTRUCT_1, PrimitiveIdentifier(TypeKind.INT32)
+    union, top = HashIdentifier(COMPLETE, bytes(14)), HashIdentifier(COMPLETE, bytes(13) + b"1")
+    objects = {
+        top: TypeObject(True, StructObject(TypeFlag.FINAL, None, (MemberObject(0, flags, union, named("u")),), "T")),
+        union: TypeObject(True, UnionObject(TypeFlag.FINAL, flags, number, (), "U")),
+    }
+    type_ = ddsi.dynamic_type(BuiltTypes(top, objects, dict.fromkeys(objects, b"")))
+    with pytest.raises(BadParameter, match="U: a union without cases cannot be said in IDL"):
+        idl.to_idl(type_)
 
 
 def test_literals_of_two_enums_beside_each_other_are_refused() -> None:
