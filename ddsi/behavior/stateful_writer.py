@@ -221,11 +221,11 @@ class StatefulWriter:
     def min_acked_sn(self) -> int:
         """All up to here (inclusive) is acknowledged by every matched reliable reader, or was never for it.
 
-        What best-effort readers were not sent yet counts as not acknowledged.
+        What best-effort readers were not sent yet, or not handed, counts as not acknowledged.
         """
         acked = min(self.next_unsent_sn - 1 if self.readers else self.cache.last_sn, self._acked.lowest)
         for proxy in self.local_readers.values():
-            if proxy.is_reliable and proxy.acked_sn < acked:
+            if proxy.acked_sn < acked:
                 acked = proxy.acked_sn
         return acked
 

@@ -8,7 +8,7 @@ import pytest
 import trio
 
 import ddsi
-from tests.dcps.running import RELIABLE, Note, Shape, eventually, in_trio, pair
+from tests.dcps.running import RELIABLE, Note, Shape, config, eventually, in_trio, pair
 
 MIB = 1 << 20
 
@@ -130,3 +130,16 @@ def test_states_are_printed_by_their_names() -> None:
     assert f"{ddsi.InstanceState.NOT_ALIVE_NO_WRITERS | ddsi.InstanceState.NOT_ALIVE_DISPOSED:>12}" == "   NOT_ALIVE"
     assert str(ddsi.SampleState.READ | ddsi.SampleState.NOT_READ) == "READ|NOT_READ"
     assert str(ddsi.ViewState(0)) == "none"
+
+
+@in_trio
+async def test_all_best_effort_readers_of_the_writers_own_participant_are_handed_each_sample(domain: int) -> None:
+    """The first of them must not free it: a volatile writer keeps nothing that all have."""
+    async with ddsi.DomainParticipant(domain, config=config()) as participant:
+        topic = ddsi.Topic(participant, "Square", Shape)
+        writer = ddsi.DataWriter(participant, topic)
+        readers = [ddsi.DataReader(participant, topic, ddsi.Qos(history=ddsi.KeepAll())) for _ in range(3)]
+        for x in range(5):
+            await writer.write(Shape("RED", x))
+        assert [[sample.data.x for sample in reader.take()] for reader in readers] == [list(range(5))] * 3
+        await writer.wait_for_acknowledgments(timeout=1)
