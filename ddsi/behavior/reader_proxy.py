@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 
+from ..structure.builtin_entity_ids import SPDP_SECURE_READER
 from ..structure.cache_change import CacheChange
 from ..structure.discovered import DiscoveredReaderData
 from ..structure.guid import GUID_UNKNOWN, EntityId, Guid
 from ..structure.locator import Locator
+from ..structure.vendor import CYCLONE
 from .content_filter import ContentFilter
 from .schedules import NACK_RESPONSE_SUPPRESSION, heartbeat_period
 
@@ -20,6 +22,7 @@ __all__ = ["ReaderProxy"]
 
 _PREEMPTIVE_ANSWER_INTERVAL_S = 0.005
 _STALE_COUNT_S = 0.5
+_ANSWERS_IN_VAIN = 3
 
 
 class ReaderProxy:
@@ -31,7 +34,9 @@ class ReaderProxy:
         "_last_nack_frag_count",
         "_last_nack_frag_time",
         "_last_preemptive",
+        "_never_acknowledges",
         "_participant",
+        "_resends",
         "_resent",
         "_unanswered",
         "acked_sn",
@@ -71,6 +76,9 @@ class ReaderProxy:
         self._last_nack_frag_time = -math.inf
         self._last_preemptive = -math.inf
         self._resent: dict[int, float] = {}
+        self._resends = 0  # since something was acknowledged
+        # Cyclone DDS takes what comes for this reader as it comes, past what counts, and asks for it for ever.
+        self._never_acknowledges = data.vendor_id == CYCLONE and data.guid.entity_id == SPDP_SECURE_READER
         self._unanswered = 0
         self.heartbeat_due = -math.inf  # not to be asked again before
 
@@ -111,6 +119,7 @@ class ReaderProxy:
         for number in [sn for sn in self._resent if sn <= committed_sn]:
             del self._resent[number]
         self.acked_sn = committed_sn
+        self._resends = 0
         return True
 
     def asked(self, now: float) -> None:
@@ -163,7 +172,12 @@ class ReaderProxy:
         if len(self._resent) >= 1024:  # bounded: forgetting only costs a resend
             self._resent.clear()
         self._resent[sequence_number] = now
+        self._resends += 1
         return True
+
+    def asks_in_vain(self) -> bool:
+        """Has it had what it asks for, in all likelihood, and cannot say so?  A GAP lets it."""
+        return self._never_acknowledges and self._resends >= _ANSWERS_IN_VAIN
 
 
 def _serial_difference(newer: int, older: int) -> int:

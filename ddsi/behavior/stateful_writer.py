@@ -531,7 +531,7 @@ class StatefulWriter:
             if number >= end_sn:
                 break
             change = self.cache.get(number)
-            if change is None or is_irrelevant(self.cache, proxy, number):
+            if change is None or is_irrelevant(self.cache, proxy, number) or proxy.asks_in_vain():
                 irrelevant.append(number)
             elif budget > 0 and proxy.may_resend(number, now):
                 if number > proxy.match_sn:

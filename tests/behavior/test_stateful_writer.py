@@ -7,6 +7,7 @@ HEARTBEAT with ``?`` asks for an answer.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -14,10 +15,12 @@ from ddsi.behavior.reader_proxy import ReaderProxy
 from ddsi.behavior.schedules import HEARTBEAT_PERIOD_MIN
 from ddsi.behavior.stateful_writer import StatefulWriter
 from ddsi.behavior.transmissions import SendHeartbeat
+from ddsi.structure.builtin_entity_ids import SPDP_SECURE_READER
 from ddsi.structure.cache_change import ChangeKind
 from ddsi.structure.guid import GUID_UNKNOWN, Guid
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import BestEffort, KeepAll, KeepLast, Lifespan, TransientLocal
+from ddsi.structure.vendor import CYCLONE, FAST_DDS
 from tests.behavior.builders import (
     LOCATOR,
     RELIABLE_QOS,
@@ -275,6 +278,23 @@ def test_the_same_is_not_sent_again_within_a_moment() -> None:
     assert "DATA 1 to 2" in acknack(writer, proxy, 1, 1, count=1, now=1.0)
     assert acknack(writer, proxy, 1, 1, count=2, now=1.004) == []
     assert "DATA 1 to 2" in acknack(writer, proxy, 1, 1, count=3, now=1.006)
+
+
+@pytest.mark.parametrize(("vendor", "answer"), [(CYCLONE, "GAP 1-1 to 2"), (FAST_DDS, "DATA 1 to 2")])
+def test_who_cannot_acknowledge_secure_spdp_is_let_off_by_a_gap(vendor: bytes, answer: str) -> None:
+    """Cyclone DDS takes what comes there and does not count it; seen to ask ten times a second for ever."""
+    writer = stateful_writer(HISTORY)
+    guid = Guid.of(reader_guid(2).prefix, SPDP_SECURE_READER)
+    data = replace(reader_data(HISTORY, of=guid), vendor_id=vendor)
+    writer.matched_reader_add(data, (LOCATOR,), 0.0)
+    send(writer, b"")
+    proxy = writer.readers[guid]
+    for count in range(1, 4):
+        assert "DATA 1 to 2" in acknack(writer, proxy, 1, 1, count=count, now=float(count))
+    assert answer in acknack(writer, proxy, 1, 1, count=4, now=4.0)
+    acknack(writer, proxy, 2, count=5, now=5.0)
+    send(writer, b"news", now=6.0)
+    assert "DATA 2 to 2" in acknack(writer, proxy, 2, 2, count=6, now=7.0)
 
 
 def test_one_acknack_does_not_cause_more_than_a_window_of_repairs() -> None:
