@@ -142,9 +142,8 @@ class Listening:
 
     def _begin(self) -> dcps.EventStream:
         """In the engine's thread: listen, and look whether there are data already, of which no event tells."""
-        if isinstance(self._inner, SampleReader) and self._inner._history.has_news:
-            self._had_data = True
-            self._inner._history.seen()
+        if isinstance(self._inner, SampleReader):
+            self._had_data = self._inner._tell()
         return self._inner.events()
 
     async def _next(self) -> Status | None:
@@ -156,6 +155,5 @@ class Listening:
         if isinstance(happened, s.DataAvailable) and isinstance(self._inner, SampleReader):
             if self._inner.is_closed:
                 return None
-            # So that the next arrival is told of too, whether or not the listener takes this one.
-            self._inner._history.seen()
+            self._inner._tell()
         return happened

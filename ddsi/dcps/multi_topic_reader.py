@@ -7,11 +7,12 @@ came to its end, agrees no longer, or does not fulfil the condition any more) th
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
 from ..structure.cache_change import CacheChange, ChangeKind
-from ..structure.errors import BadParameter
+from ..structure.errors import BadParameter, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import Qos, reader_qos
 from ..structure.sample_info import SampleInfo
@@ -134,6 +135,12 @@ class MultiTopicReader(SampleReader[T]):
         """Whoever selects looks at what is here: what came to the parts is joined first."""
         self._absorb()
         return super()._selection(condition, sample_states, view_states, instance_states)
+
+    def _tell(self) -> bool:
+        """What came to the parts is news to them again only when it was taken."""
+        with suppress(PreconditionNotMet):  # they may not be taken from: not enabled, or outside `subscriber.access()`
+            self._absorb()
+        return super()._tell()
 
     async def _wait_for_news(self) -> None:
         self._pump.before_waiting()

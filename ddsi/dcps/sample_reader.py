@@ -225,6 +225,12 @@ class SampleReader(Entity, Generic[T]):
             check_count("max_samples", max_samples)
         return max_samples
 
+    def _tell(self) -> bool:
+        """A listener is about to be told: has anything come?  The next arrival is news again, taken or not."""
+        has_news = self._history.has_news
+        self._history.seen()
+        return has_news
+
     def _check_iterable(self) -> None:
         """May samples be taken one after the other as they come?"""
 

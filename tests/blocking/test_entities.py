@@ -486,3 +486,26 @@ def test_a_listener_is_told_when_samples_are_joined(domain: int) -> None:
         for number in range(3):
             shapes.write(Shape("BLUE", number))
             assert joined.get(timeout=10) == Owned("BLUE", number, "Ada")
+
+
+def test_a_listener_is_told_of_joined_samples_whether_it_takes_them_or_not(domain: int) -> None:
+    """Also of those that are there when the reader is made."""
+    told: queue.SimpleQueue[object] = queue.SimpleQueue()
+
+    class Hearing(blocking.Listener):
+        def on_data_available(self, reader: blocking.MultiTopicReader[Owned]) -> None:
+            told.put(reader)
+
+    lasting = RELIABLE | ddsi.Qos(durability=ddsi.TransientLocal())
+    with blocking.DomainParticipant(domain) as participant:
+        shapes = blocking.DataWriter(participant, blocking.Topic(participant, "Square", Shape), lasting)
+        plans = blocking.DataWriter(participant, blocking.Topic(participant, "Plan", Plan), lasting)
+        topic = blocking.MultiTopic(participant, "Owned", Owned, "SELECT * FROM Square NATURAL JOIN Plan")
+        plans.write(Plan("BLUE", "Ada"))
+        shapes.write(Shape("BLUE", 0))
+        reader = blocking.MultiTopicReader(participant, topic, lasting, listener=Hearing())
+        assert told.get(timeout=10) is reader
+        for number in range(1, 4):
+            shapes.write(Shape("BLUE", number))
+            assert told.get(timeout=10) is reader
+        assert [sample.data.x for sample in reader.take()] == [0, 1, 2, 3]
