@@ -16,7 +16,7 @@ from ddsi import BadParameter, idl
 from ddsi.xtypes.definition import struct_type
 from ddsi.xtypes.model import StructType, reachable_structs
 from ddsi.xtypes.resolution import named_type
-from ddsi.xtypes.type_object import BuiltTypes, HashIdentifier, TypeObject
+from ddsi.xtypes.type_object import BuiltTypes, HashedIdentifier, HashIdentifier, TypeObject
 from ddsi.xtypes.type_object.identifiers import PrimitiveIdentifier
 from ddsi.xtypes.type_object.kinds import COMPLETE, MemberFlag, TypeFlag, TypeKind
 from ddsi.xtypes.type_object.objects import MemberObject, StructObject, UnionObject, named
@@ -221,7 +221,7 @@ def test_what_idl_cannot_name_is_refused() -> None:
 def test_a_union_of_a_peer_without_cases_is_refused() -> None:
     flags, number = MemberFlag.TRY_CONSTRUCT_1, PrimitiveIdentifier(TypeKind.INT32)
     union, top = HashIdentifier(COMPLETE, bytes(14)), HashIdentifier(COMPLETE, bytes(13) + b"1")
-    objects = {
+    objects: dict[HashedIdentifier, TypeObject] = {
         top: TypeObject(True, StructObject(TypeFlag.FINAL, None, (MemberObject(0, flags, union, named("u")),), "T")),
         union: TypeObject(True, UnionObject(TypeFlag.FINAL, flags, number, (), "U")),
     }
