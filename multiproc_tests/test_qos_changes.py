@@ -12,9 +12,10 @@ import pytest
 import trio
 
 from .framework import Namespace, Process, Scenario, async_test, namespace, scenario
-from .peers.catalogue import CYCLONE_PYTHON, FAST_DDS
+from .peers.catalogue import CYCLONE_C, CYCLONE_PYTHON, FAST_DDS
+from .peers.keystore import shared_keystore
 from .peers.options import Options
-from .peers.peer import network_environment
+from .peers.peer import Peer, network_environment
 
 PROGRAMS = "multiproc_tests.peers.programs"
 STEP_S = 20.0
@@ -67,6 +68,34 @@ async def test_a_writer_leaves_a_partition_and_comes_back_by_a_wildcard(reader: 
             await writer.send("write 3")
             await other.expect(r"SAMPLE (BLUE )?3 .*", timeout=STEP_S)
             assert not other.matches(r"SAMPLE (BLUE )?2 .*")
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("governance", ["metadata-data", "data", "all-origin"])
+@pytest.mark.parametrize("peer", [CYCLONE_C, FAST_DDS], ids=["cyclone", "fastdds"])
+@async_test
+async def test_secured_a_writer_leaves_a_partition_and_comes_back(peer: Peer, governance: str) -> None:
+    """Fast DDS throws away the keys of who leaves, and Cyclone DDS does not notice."""
+    peer.locate()
+    folder, document = str(shared_keystore().folder), f"{governance}.p7s"
+    with namespace() as host:
+        async with scenario("a secured partition that changes", deadline=90) as stage:
+            secure = ("--secure", document, folder)
+            writer = await changing(stage, host, "writer", "ddsi_changing", "pub", DOMAIN, "blue", *secure)
+            security = {"keystore": folder, "identity": "bob", "governance": document}
+            options = Options(domain=int(DOMAIN), partitions=("blue",), volatile=True, count=4, **security)  # type: ignore[arg-type]
+            reader = await peer.start(stage, "sub", options, host=host)
+            await matched(reader, writer)
+            await writer.send("write 1")
+            await reader.expect("SAMPLE BLUE 1 .*", timeout=STEP_S)
+            for number in (2, 3):
+                await change(writer, "partition red")
+                await matched(writer, count=0)
+                await trio.sleep(0.5)
+                await change(writer, "partition blue")
+                await matched(writer)
+                await writer.send(f"write {number}")
+                await reader.expect(f"SAMPLE BLUE {number} .*", timeout=STEP_S)
 
 
 @pytest.mark.peers

@@ -1,6 +1,6 @@
 """Our writer or reader whose policies change as lines on standard input say.
 
-    ddsi_changing pub|sub DOMAIN PARTITION [--exclusive]
+    ddsi_changing pub|sub DOMAIN PARTITION [--exclusive] [--secure GOVERNANCE FOLDER]
 
 Lines: ``partition NAME...``, ``strength N``, ``deadline SECONDS``, ``write NUMBER``, ``end``.  It says MATCHED with how
 many are matched whenever that changes, CHANGED or REFUSED after a change, SAMPLE, and INCOMPATIBLE with the policy.
@@ -17,8 +17,8 @@ import trio
 
 import ddsi
 
-from .ddsi_shapes import ShapeType, wait_for_input
-from .protocol import say
+from .ddsi_shapes import ShapeType, participant_qos, wait_for_input
+from .protocol import Arguments, say
 
 
 async def lines() -> AsyncIterator[list[str]]:
@@ -62,13 +62,21 @@ async def take(reader: ddsi.DataReader[Any]) -> None:
             say("SAMPLE", sample.data.x, sample.data.shapesize)
 
 
+def secured(flags: list[str]) -> ddsi.Qos | None:
+    """As alice."""
+    if "--secure" not in flags:
+        return None
+    governance, folder = flags[flags.index("--secure") + 1 :]
+    return participant_qos(Arguments(store=folder, name="alice", governance=governance))
+
+
 async def main() -> None:
     role, domain, partition, *flags = sys.argv[1:]
     group_qos = ddsi.Qos(partition=ddsi.Partition(partition))
     qos = ddsi.Qos(reliability=ddsi.Reliable(max_blocking_time=10), history=ddsi.KeepAll())
     if "--exclusive" in flags:
         qos |= ddsi.Qos(ownership=ddsi.Exclusive())
-    async with ddsi.DomainParticipant(int(domain)) as participant, trio.open_nursery() as nursery:
+    async with ddsi.DomainParticipant(int(domain), qos=secured(flags)) as participant, trio.open_nursery() as nursery:
         topic = ddsi.Topic(participant, "Square", ShapeType)
         entity: Any
         if role == "pub":
