@@ -91,4 +91,8 @@ if not ENCLAVES.is_dir():
         "    ddsi keystore create keystore --identity alice --publish Temperatures\n"
         "    ddsi keystore enclave keystore bob --subscribe Temperatures"
     )
-trio.run({"subscribe": subscribe, "publish": publish, "intrude": intrude}.get("".join(sys.argv[1:]), main))
+parts = {"": main, "subscribe": subscribe, "publish": publish, "intrude": intrude}
+part = parts.get(" ".join(sys.argv[1:]))
+if part is None:
+    sys.exit("usage: 06_secured.py [subscribe | publish | intrude]")
+trio.run(part)

@@ -102,7 +102,8 @@ def _identities(keystore: Path | None) -> Iterator[dict[str, Properties]]:
             except SystemExit:  # nobody provides the command
                 status = ExitStatus.USAGE
         if status:
-            raise CommandError(f"no keystore can be made: {complaint.getvalue().strip() or 'no command for it'}")
+            said = complaint.getvalue().strip().removeprefix("ddsi keystore: ") or "no command for it"
+            raise CommandError(f"no keystore can be made: {said}")
         yield _read(made)
 
 

@@ -123,7 +123,13 @@ class EngineThread:
         await self._await(function, lane)
 
     async def _await(self, function: Callable[[], Awaitable[R]], lane: Lane | None) -> R:
-        loop = asyncio.get_running_loop()
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            raise PreconditionNotMet(
+                "entities of ddsi.aio live in asyncio, which does not run here: start the program by "
+                "`asyncio.run(main())`, or take those of ddsi for trio, of ddsi.blocking for a plain script or thread"
+            ) from None
         done = loop.create_future()
         call = Call[R](function, partial(_tell, loop, done))
         self._submit(call, partial(self._begin, call, lane))

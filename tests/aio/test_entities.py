@@ -9,10 +9,11 @@ from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, ParamSpec, assert_type
 
 import pytest
+import trio
 
 import ddsi
 from ddsi import aio, idl
-from tests.dcps.running import RELIABLE, Note, Shape
+from tests.dcps.running import RELIABLE, Note, Shape, config
 
 P = ParamSpec("P")
 
@@ -393,3 +394,12 @@ async def test_topics_are_joined(domain: int) -> None:
         with pytest.raises(ddsi.BadParameter, match=r"ddsi\.aio"):
             aio.MultiTopicReader(participant, inner)
     assert [sample async for sample in reader] == []
+
+
+def test_a_participant_is_refused_where_asyncio_does_not_run() -> None:
+    async def main() -> None:
+        async with aio.DomainParticipant(0, config=config()):
+            pass
+
+    with pytest.raises(ddsi.PreconditionNotMet, match=r"asyncio\.run\(main\(\)\).*ddsi for trio, of ddsi\.blocking"):
+        trio.run(main)
