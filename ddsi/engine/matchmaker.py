@@ -315,7 +315,7 @@ class Matchmaker:
         # Who authenticated anew may be the same as before, and then repeats what it keeps.  Without protection a new
         # program's samples may have come in the old one's place already, and nothing tells what is a repetition.
         is_forgotten = reason is LossReason.RESTARTED
-        may_return = reason is LossReason.LEASE_EXPIRED or (is_forgotten and self._is_protected(guid))
+        may_return = reason is LossReason.LEASE_EXPIRED or (is_forgotten and self._is_protected(reader, guid))
         self.detach_writer(reader, guid, now, may_return=may_return, is_forgotten=is_forgotten)
         engine.hooks.unmatch(reader.guid, guid)
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
@@ -330,9 +330,12 @@ class Matchmaker:
             reader.guid, reader.liveliness_changed(guid, alive=-1 if alive else 0, not_alive=0 if alive else -1)
         )
 
-    def _is_protected(self, writer: Guid) -> bool:
+    def _is_protected(self, reader: LocalReader, writer: Guid) -> bool:
+        """Of what governance says: the keys of who authenticated anew are wiped by now."""
         hooks = self._engine.hooks
-        return hooks.protects_payload(writer) or not hooks.admits(writer, Protection.NONE)
+        security = hooks.endpoint_security(reader.data)
+        is_protected = security.is_submessage_protected or security.is_payload_protected
+        return is_protected or not hooks.admits(writer, Protection.NONE)
 
     def detach_writer(
         self, reader: LocalReader, guid: Guid, now: float, *, may_return: bool = False, is_forgotten: bool = False

@@ -91,12 +91,13 @@ def test_a_restart_of_either_side_is_forgiven(governance: str, identities: dict[
         assert domain.run_until(lambda reader=reader: len(reader.taken) >= 1, 10.0)  # type: ignore[misc]
 
 
+@pytest.mark.parametrize("governance", [name for name in GOVERNANCES if name != "nothing"])
 @pytest.mark.parametrize("who", ["reader", "writer"])
 def test_who_forgot_the_other_finds_it_again_and_gets_nothing_twice(
-    who: str, identities: dict[str, list[Properties]]
+    who: str, governance: str, identities: dict[str, list[Properties]]
 ) -> None:
     """A lease runs out on one side only; to the other it looks as if its peer had started again."""
-    domain = secured_pair(identities["encrypt"], Watch())
+    domain = secured_pair(identities[governance], Watch())
     first, second = domain.nodes
     writer = first.writer("Square", RELIABLE)
     reader = second.reader("Square", RELIABLE)
