@@ -98,7 +98,9 @@ class ReaderHistoryCache:
         self._order: deque[SampleInfo] = deque()
         self._removed_count = 0
         self._octets = 0
-        self._gate = SampleGate(qos, wall_time=wall_time or (lambda now: now + clock_offset), on_timer=on_timer)
+        self._gate = SampleGate(
+            qos, wall_time=wall_time or (lambda now: now + clock_offset), on_timer=on_timer, max_octets=max_octets
+        )
 
     def __len__(self) -> int:
         """How many samples can be read or taken."""
@@ -119,8 +121,11 @@ class ReaderHistoryCache:
 
     # --- what comes in -----------------------------------------------------------------------------------
 
-    def add(self, change: CacheChange, now: float) -> bool:
-        """Take one change; False when a reliable writer's has to wait until the application has taken something."""
+    def add(self, change: CacheChange, now: float, *, is_deferred: bool = False) -> bool:
+        """Take one change; False when a reliable writer's has to wait until the application has taken something.
+
+        ``is_deferred``: it came before, and was too soon then.
+        """
         if self.content_filter is not None and not self.content_filter.passes(change):
             return True
         instance = self._instances.get(change.key)
@@ -134,7 +139,7 @@ class ReaderHistoryCache:
             self._add_end(instance, change, now)
             return True
         gate = self._gate
-        if not gate.is_open and not gate.admits(instance, change, now):
+        if not gate.is_open and not is_deferred and not gate.admits(instance, change, now):
             return True
         samples = instance.samples
         if self._by_source and source_order.comes_too_late(instance, change, self._depth):
@@ -392,6 +397,12 @@ class ReaderHistoryCache:
         for key in missed:
             if key in self._instances:
                 self._instances[key].owner = None
+        for change in self._gate.deferred(now):
+            instance = self._instances.get(change.key)
+            if instance is None or not self._gate.may_write(change.writer_guid, instance):
+                self._gate.give_up(change)
+            else:
+                self.add(change, now, is_deferred=True)
         for key in self._gate.to_purge(now):
             self._forget(key)
         self._gate.arm()

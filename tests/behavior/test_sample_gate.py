@@ -11,6 +11,7 @@ from ddsi.structure.cache_change import CacheChange, ChangeKind
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos import Qos, reader_qos, writer_qos
 from ddsi.structure.qos_policies import (
+    BestEffort,
     Deadline,
     Exclusive,
     KeepAll,
@@ -170,6 +171,54 @@ def test_of_what_comes_too_soon_nothing_is_let_in() -> None:
     for now in (0.0, 0.5, 0.9, 1.0, 1.9, 2.0):
         cache.put(now)
     assert cache.numbers() == [1, 4, 6]
+
+
+FILTERED = Qos(time_based_filter=TimeBasedFilter(1.0))
+
+
+def test_the_last_of_what_came_too_soon_is_let_in_when_nothing_follows() -> None:
+    """DDS 1.4 §2.2.3.12: where writing pauses, a reliable reader gets the last sample after all."""
+    cache = Cache(FILTERED)
+    for now in (0.0, 0.5, 0.9):
+        cache.put(now)
+    cache.ring(1.8)
+    assert cache.numbers() == [1]
+    cache.ring(1.9)
+    assert cache.numbers() == [3]
+    cache.put(2.5)
+    cache.ring(9.0)
+    assert cache.numbers() == [4]
+    cache.ring(20.0)
+    assert cache.numbers() == []
+
+
+def test_a_best_effort_reader_is_promised_no_last_sample() -> None:
+    cache = Cache(FILTERED | Qos(reliability=BestEffort()))
+    cache.put(0.0)
+    cache.put(0.5)
+    cache.ring(9.0)
+    assert cache.numbers() == [1]
+
+
+@pytest.mark.parametrize("kind", [DISPOSE, ChangeKind.ALIVE])
+def test_what_was_held_back_does_not_come_behind_what_followed_it(kind: ChangeKind) -> None:
+    cache = Cache(FILTERED)
+    cache.put(0.0)
+    cache.put(0.5)
+    cache.put(1.2, kind=kind)
+    cache.ring(9.0)
+    assert [change.sequence_number for _, change in cache.take()] == [1, 3]
+
+
+def test_what_is_held_back_waits_for_room_and_ends_with_its_life() -> None:
+    limits = ResourceLimits(max_samples=1, max_instances=1, max_samples_per_instance=1)
+    cache = Cache(FILTERED | Qos(resource_limits=limits))
+    cache.put(0.0)
+    cache.put(0.5)
+    cache.ring(1.5)
+    assert cache.numbers() == [1]
+    cache.ring(2.5)
+    assert cache.numbers() == [2]
 
 
 def test_instances_are_filtered_each_for_itself_and_ends_never() -> None:

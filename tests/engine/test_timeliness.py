@@ -156,3 +156,5 @@ def test_samples_that_come_too_soon_are_acknowledged_and_not_shown(local: bool) 
     write_every(domain, writer, 0.26, 12)
     assert numbers(reader) == [1, 5, 9]
     assert writer.local.behavior.min_acked_sn() == 12
+    domain.run(1.0)
+    assert numbers(reader) == [1, 5, 9, 12], "where writing pauses, the last one comes after all"
