@@ -100,6 +100,8 @@ class QosProvider:
         return _built(entity, _Resolution(self, entity, topic).settings(profile))
 
     def _find(self, name: str) -> Profile:
+        if not isinstance(name, str):
+            raise BadParameter(f"the name of a QoS profile is a str, as 'Library::Profile', not {name!r}")
         found = self._lookup(name, "")
         if found is None:
             raise BadParameter(f"QoS profile {name!r} was asked for, {self._why_unknown(name)}")

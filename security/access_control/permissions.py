@@ -115,8 +115,12 @@ class Permissions:
         grant, *others = grants
         if problem := grant.validity.problem(now):
             valid = next((other for other in others if now in other.validity), None)
-            hint = f"; the one in line {valid.line} is valid, but the first for a name decides" if valid else ""
-            return Refused(f"{grant} {problem}{hint}")
+            hint = (
+                f"the one in line {valid.line} is valid, but the first for a name decides"
+                if valid
+                else "it needs other dates, and to be signed anew: `ddsi keystore permissions`"
+            )
+            return Refused(f"{grant} {problem}; {hint}")
         return grant
 
 

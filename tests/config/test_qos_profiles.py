@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -136,6 +137,9 @@ def test_names_and_defaults(omg: QosProvider) -> None:
     assert omg.reader("Deep::Buoy") == ddsi.Qos()
     with pytest.raises(ddsi.BadParameter, match=r"'Ferry' was asked for, .* there are Harbour::Base, "):
         omg.writer("Ferry")
+    number: Any = 5
+    with pytest.raises(ddsi.BadParameter, match="as 'Library::Profile', not 5"):
+        omg.writer(number)
     with pytest.raises(ddsi.BadParameter, match="default for a writer"):
         QosProvider(FILES / "deep.xml").writer()
     with pytest.raises(ddsi.BadParameter, match="at least one file"):
