@@ -26,8 +26,8 @@ LOST_FINAL = (
     "it takes itself for authenticated and answers no repeated reply"
 )
 UNHEARD_FINAL = (
-    "Fast DDS now and then does not hear the last handshake message of Cyclone, which sends it once; then it asks for it "
-    "for ever, and its writer matches nobody, also not those with whom it is done"
+    "Fast DDS now and then does not hear the last handshake message of Cyclone, which sends it once; then it asks for "
+    "it for ever, and its writer matches nobody, also not those with whom it is done"
 )
 
 
