@@ -10,8 +10,8 @@ TYPED := $(PACKAGES) typings/ddsi_security
 
 # A test file stays in one worker, as what its tests share is made once.
 IN_PARALLEL := -n auto --dist loadfile
-# Real processes, each scenario in namespaces of its own: two at a time, as they mostly wait, and late ones are failures.
-TWO_AT_A_TIME := -n 2
+# Real processes, each scenario in namespaces of its own: three at a time, as they mostly wait, and late ones are failures.
+THREE_AT_A_TIME := -n 3
 
 # Tests and the demo stay on this host, whatever the machine is connected to.
 export DDSI_URI := <DDSI><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></DDSI>
@@ -31,7 +31,7 @@ demo: $(VENV)/.ready-to-run  ## Live data between processes, under a minute
 
 test: $(VENV)/.ready-to-test $(VENV)/.ready-with-peers $(VENV)/.ready-to-lint  ## All tests; those with other stacks where these are installed
 	$(BIN)/python -m pytest $(IN_PARALLEL) $(wildcard tests) $(ARGS)
-	$(BIN)/python -m pytest $(TWO_AT_A_TIME) -m "not alone" $(wildcard multiproc_tests) $(ARGS)
+	$(BIN)/python -m pytest $(THREE_AT_A_TIME) -m "not alone" $(wildcard multiproc_tests) $(ARGS)
 	$(BIN)/python -m pytest -m alone $(wildcard multiproc_tests) $(ARGS)
 
 quick: $(VENV)/.ready-to-test  ## The tests that take milliseconds, without other processes
