@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Pump", "PumpOptions"]
 
+_KEPT_OCTETS = 2 << 20
+"""glibc gives memory back to the system when 128 KiB lie free, and each large sample would fault its pages in anew.  A
+block of this size, once it is freed, lets it keep twice as much (mallopt(3), M_MMAP_THRESHOLD)."""
 _BATCH = 64
 _MAX_BACKLOG = 1024
 _OPERATIONS_BEFORE_YIELD = 64
@@ -102,6 +105,7 @@ class Pump:
         self._operations = 0
         self._last_yield = -math.inf
         self._buffer = memoryview(bytearray(65536))
+        bytes(_KEPT_OCTETS)  # allocated, and freed
         self._lead = Lead(self._settle_late)
         self._is_unsettled = False
 
