@@ -40,7 +40,9 @@ def main(domain: int, count: int, seconds: float) -> int:
     qos = Qos(Policy.Reliability.Reliable(duration(seconds=10)), Policy.History.KeepAll)
     participant = DomainParticipant(domain)
     writer = DataWriter(participant, Topic(participant, "Circle", ShapeType), qos)
-    reader = DataReader(participant, Topic(participant, "Square", ShapeType), qos)
+    # The writer may know of this reader before this reader knows of it, and then it would miss the first sample.
+    late = Qos(Policy.Durability.TransientLocal, base=qos)
+    reader = DataReader(participant, Topic(participant, "Square", ShapeType), late)
     print("READY", flush=True)
     end = time.monotonic() + seconds
     received = written = 0

@@ -111,7 +111,7 @@ class _Demo:
         topics, total, readers = ("Square,Circle", 2 * _SAMPLES, 2) if with_foreign else ("Square", _SAMPLES, 1)
         subscribe = ["shapes", "sub", "-t", topics, "-n", str(total)]
         publish = ["shapes", "pub", "-t", "Square", "-c", "BLUE", "-n", str(_SAMPLES), "--rate", str(_RATE_HZ)]
-        publish += ["--wait", str(readers)]
+        publish += ["--wait", str(readers), "--transient-local"]
         subscriber = await stage.start("subscriber", [*OURS, *subscribe, *common], verb="received")
         publisher = await stage.start("publisher", [*OURS, *publish, *common], verb="wrote", capture=capture)
         return subscriber, publisher
