@@ -1,8 +1,8 @@
 """Repeats: what a writer that was lost sends again when it is back, and a reader has already delivered.
 
 RTPS 2.5 §8.4.10 knows a match that ended no more: when the lease of a participant runs out (a cable was pulled, a
-process stood still) and it is heard again, its writers are matched as if they were new, and those that keep history
-send it all once more.  To the application these would be the same samples twice.  So a reader remembers of each writer
+process stood still) and it is heard again, or when a writer and a reader part and meet again by a new partition, its
+writers are matched as if they were new, and those that keep history send it all once more.  To the application these would be the same samples twice.  So a reader remembers of each writer
 that it lost how far it had come, and drops what lies before.
 
 A number alone does not tell a repeat from a sample of a writer that has restarted under its old GUID (stacks that make

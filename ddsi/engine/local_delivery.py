@@ -46,6 +46,7 @@ class LocalDelivery:
                     change.key = reader.key_of(change) or b""  # written when nobody here needed it
                 if not reader.behavior.history.add(change, now):
                     break
+                writer_proxy.latest_timestamp = change.source_timestamp
             number += 1
         writer_proxy.reorder.next_sn = number
         writer_proxy.last_seq = cache.last_sn

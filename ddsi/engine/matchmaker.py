@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Matchmaker"]
 
+# After these a writer may be matched again as the same that it was, and then repeats to the reader what it keeps.
+_MAY_RETURN = frozenset(
+    {LossReason.LEASE_EXPIRED, LossReason.QOS_CHANGED, LossReason.REJECTED_BY_SECURITY, LossReason.EVICTED}
+)
+
 
 class Matchmaker:
     """``refusals``: for each (local, remote) pair of one topic that does not match, the reason."""
@@ -315,14 +320,16 @@ class Matchmaker:
         # Who authenticated anew may be the same as before, and then repeats what it keeps.  Without protection a new
         # program's samples may have come in the old one's place already, and nothing tells what is a repetition.
         is_forgotten = reason is LossReason.RESTARTED
-        may_return = reason is LossReason.LEASE_EXPIRED or (is_forgotten and self._is_protected(reader, guid))
+        may_return = reason in _MAY_RETURN or (is_forgotten and self._is_protected(reader, guid))
         self.detach_writer(reader, guid, now, may_return=may_return, is_forgotten=is_forgotten)
         engine.hooks.unmatch(reader.guid, guid)
         self._engine.recorder.unmatched(reader.guid, guid, reader.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_unmatched(guid, now)
-            engine.presentation.writer_unmatched(reader, guid, reason, now)
-        if proxy is not None and proxy.is_reliable and not may_return and reason is not LossReason.CLOSED:
+            engine.presentation.writer_unmatched(reader, guid, reason, now, may_return=reason in _MAY_RETURN)
+        # A writer that was only silent may never have lost us, and then still brings what it has for us.
+        is_final = reason not in (LossReason.CLOSED, LossReason.LEASE_EXPIRED)
+        if proxy is not None and proxy.is_reliable and is_final and not (may_return and proxy.needs_historical_data):
             engine.samples_lost(reader, proxy, len(proxy.reorder), proxy.next_sn, SampleLossReason.WRITER_LOST)
         engine.status(reader.guid, reader.match_changed(guid, -1))
         alive = proxy is None or proxy.is_alive
@@ -358,15 +365,17 @@ class Matchmaker:
 
     def _unmatch_local(self, writer: LocalWriter, reader: LocalReader, reason: LossReason, now: float) -> None:
         engine = self._engine
-        if reason is not LossReason.CLOSED or writer.guid in engine.closing:
+        may_return = reason in _MAY_RETURN
+        will_repeat = may_return and reader.behavior.writers[writer.guid].needs_historical_data
+        if writer.guid in engine.closing or not (will_repeat or reason is LossReason.CLOSED):
             engine.local_delivery.given_up(writer, reader)
         writer.behavior.matched_reader_remove(reader.guid, now)
-        proxy = reader.behavior.matched_writer_remove(writer.guid, now)
+        proxy = reader.behavior.matched_writer_remove(writer.guid, now, may_return=may_return)
         alive = proxy is None or proxy.is_alive
         self._engine.recorder.unmatched(writer.guid, reader.guid, writer.data.topic_name, reason)
         if reader.history is not None:
             reader.history.writer_unmatched(writer.guid, now)
-            engine.presentation.writer_unmatched(reader, writer.guid, reason, now)
+            engine.presentation.writer_unmatched(reader, writer.guid, reason, now, may_return=may_return)
         engine.status(writer.guid, writer.match_changed(reader.guid, -1))
         engine.status(reader.guid, reader.match_changed(writer.guid, -1))
         engine.status(reader.guid, reader.liveliness_changed(writer.guid, alive=-int(alive), not_alive=int(alive) - 1))

@@ -186,17 +186,15 @@ class Presentation:
         if reader.subscriber is not None and proxy is not None:
             reader.subscriber.writer_matched(reader.guid, proxy)
 
-    def writer_unmatched(self, reader: LocalReader, writer: Guid, reason: LossReason, now: float) -> None:
+    def writer_unmatched(
+        self, reader: LocalReader, writer: Guid, reason: LossReason, now: float, *, may_return: bool
+    ) -> None:
         """What it has begun and not ended is forgotten."""
         if reader.sets is not None:
             reader.sets.writer_unmatched(writer, now)
         if reader.subscriber is not None:
             reader.subscriber.writer_unmatched(
-                reader.guid,
-                writer,
-                now,
-                has_said_all=reason is LossReason.CLOSED,
-                may_return=reason is LossReason.LEASE_EXPIRED,
+                reader.guid, writer, now, has_said_all=reason is LossReason.CLOSED, may_return=may_return
             )
 
     def heartbeat(self, reader: LocalReader, proxy: WriterProxy, heartbeat: Heartbeat, now: float) -> None:

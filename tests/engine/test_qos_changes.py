@@ -26,11 +26,13 @@ from ddsi.structure.qos_policies import (
     OwnershipStrength,
     Partition,
     Reliable,
+    ResourceLimits,
     TimeBasedFilter,
     TopicData,
     TransientLocal,
     TransportPriority,
     UserData,
+    Volatile,
 )
 from ddsi.structure.status import (
     OfferedIncompatibleQos,
@@ -75,6 +77,46 @@ def test_another_partition_ends_the_match_and_the_old_one_brings_it_back(local: 
     writer.write()
     domain.run(0.5)
     assert numbers(reader) == [2], "volatile: what was written in the other partition is not for this reader"
+
+
+@both_ways
+@pytest.mark.parametrize("who", ["writer", "reader"])
+def test_who_meets_a_reader_again_gives_it_only_what_that_lacks(local: bool, who: str) -> None:
+    """Transient local: what was written meanwhile comes, as to a late joiner; what was delivered before does not."""
+    domain, writer, reader = matched(Qos(durability=TransientLocal()), local=local)
+    mover = writer if who == "writer" else reader
+    for partition in (Partition("blue"), Partition()) * 3:
+        writer.write()
+        domain.run(0.5)
+        mover.change(KEPT | Qos(durability=TransientLocal(), partition=partition))
+        domain.run(0.5)
+    assert counts(writer, reader) == (1, 1)
+    assert numbers(reader) == [1, 2, 3, 4, 5, 6]
+
+
+@both_ways
+@pytest.mark.parametrize(("durability", "lost"), [(TransientLocal(), 0), (Volatile(), 2)], ids=["kept", "volatile"])
+def test_what_a_full_reader_had_no_room_for_is_lost_only_if_nobody_keeps_it(
+    local: bool, durability: TransientLocal | Volatile, lost: int
+) -> None:
+    kept = KEPT | Qos(durability=durability)
+    domain = Domain()
+    node = domain.node()
+    writer = node.writer("Square", kept, keyed=True)
+    few = kept | Qos(resource_limits=ResourceLimits(max_samples=2))
+    reader = (node if local else domain.node()).reader("Square", few, keyed=True, takes=False)
+    assert domain.run_until(domain.all_matched, 1)
+    for _ in range(4):
+        writer.write()
+    domain.run(0.5)
+    for partition in (Partition("blue"), Partition()):
+        writer.change(kept | Qos(partition=partition))
+        domain.run(0.5)
+    for _ in range(3):
+        reader.take()
+        domain.run(0.5)
+    assert reader.local.lost.total_count == lost
+    assert numbers(reader) == [1, 2, 3, 4][: 4 - lost]
 
 
 @both_ways
