@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 __all__ = ["Inbound", "Incoming"]
 
 _DATA = int(SubmessageKind.DATA)
+_DATA_FRAG = int(SubmessageKind.DATA_FRAG)
 _INFO_TS = int(SubmessageKind.INFO_TS)
 _TIMESTAMP = struct.Struct("<II")
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
@@ -223,9 +224,12 @@ class Inbound:
             return
         incoming.protection = outside | _IN_ENVELOPE
         length = len(decoded)
-        usual_head = (_DATA, _LE_DATA_ONLY, length - 4)
-        if length > 24 and not length & 3 and SUBMESSAGE_HEAD.unpack_from(decoded) == usual_head:
+        kind, flags, following = SUBMESSAGE_HEAD.unpack_from(decoded) if length > 4 else (0, 0, 0)
+        is_usual = following == length - 4 and flags & 1 and not length & 3
+        if is_usual and kind == _DATA and flags == _LE_DATA_ONLY:
             self._data(incoming, decoded, 4, length)
+        elif is_usual and kind == _DATA_FRAG:
+            self._data_frag(incoming, RawSubmessage(kind, flags, memoryview(decoded)[4:], 0))
         else:
             self._submessages(incoming, memoryview(decoded), 0)
         incoming.protection = outside
@@ -518,6 +522,8 @@ class Inbound:
     ) -> None:
         if len(fragments) < data.run_length:
             raise MalformedMessage(f"{len(fragments)} octets of {data.run_length}", element="DATA_FRAG")
+        # Read at once: it lies in a buffer that holds something else when the last fragment comes.
+        inline = InlineQos.read(data.inline_qos) if data.inline_qos is not None else None
         defragmenter = remote.defragmenter
         dropped = defragmenter.dropped
         sample = defragmenter.add(
@@ -535,9 +541,9 @@ class Inbound:
             self._engine.dropped(DropReason.TABLE_FULL_FRAGMENTS, incoming.source)
         if sample is None:
             return
-        if data.inline_qos is not None or sample.timestamp is None:
+        if inline is not None or sample.timestamp is None:
             # Cyclone DDS sends inline QoS with the first fragment only, which may come last.
-            sample.inline_qos = data.inline_qos or sample.inline_qos
+            sample.inline_qos = inline or sample.inline_qos
             sample.timestamp = incoming.timestamp
         if sample.is_complete:
             self._sample_complete(incoming, remote, data, sample)
@@ -551,7 +557,7 @@ class Inbound:
                 return
             octets = bytes(payload)
         timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp
-        inline = InlineQos.read(sample.inline_qos)
+        inline = sample.inline_qos if isinstance(sample.inline_qos, InlineQos) else InlineQos()
         self._joined(incoming, remote, sample.reader_id, data.writer_sn, octets, inline, is_key=data.is_key)
         incoming.timestamp = timestamp
 

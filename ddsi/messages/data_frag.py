@@ -137,9 +137,8 @@ class DataFrag:
         little_endian, view = bool(flags & LITTLE_ENDIAN), memoryview(body)
         if len(view) < _BODY_LENGTH:
             raise _malformed(f"{len(view)} octets", 0)
-        _, to_inline_qos, reader_id, writer_id, high, low, starting_num, count, size, sample_size = _BODY[
-            little_endian
-        ].unpack_from(view)
+        unpack = _BODY[little_endian].unpack_from
+        _, to_inline_qos, reader_id, writer_id, high, low, starting_num, count, size, sample_size = unpack(view)
         writer_sn, rest = high << 32 | low, _TO_INLINE_QOS_END + to_inline_qos
         if to_inline_qos % 4 or not _BODY_LENGTH <= rest <= len(view):
             reason = f"octetsToInlineQos is {to_inline_qos}, {len(view) - _TO_INLINE_QOS_END} octets are left"
