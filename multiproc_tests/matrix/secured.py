@@ -77,6 +77,7 @@ def _case(
     options: Options = SHAPES,
     is_reversed: bool = False,
     algorithm: Algorithm = Algorithm.EC,
+    authorities: Algorithm | None = None,
     needs: frozenset[Ability] = frozenset(),
     receivers: int = 1,
     quick: tuple[tuple[str, str], ...] = (),
@@ -94,14 +95,14 @@ def _case(
         publisher={**roles["publisher"], **publisher},
         subscriber=roles["subscriber"],
         quick_pairs=frozenset(quick),
-        keystore=_keystore_of(algorithm),
+        keystore=_keystore_of(algorithm, authorities),
         evidence=Evidence(options, receivers),
         weather=weather,
     )
 
 
-def _keystore_of(algorithm: Algorithm) -> Callable[[], Path]:
-    return lambda: shared_keystore(algorithm).folder
+def _keystore_of(algorithm: Algorithm, authorities: Algorithm | None) -> Callable[[], Path]:
+    return lambda: shared_keystore(algorithm, authorities).folder
 
 
 def _governance_cases() -> Iterator[Case]:
@@ -138,6 +139,19 @@ def _rsa_cases() -> Iterator[Case]:
             f"rsa-{governance}", claim, deliver, governance,
             algorithm=Algorithm.RSA, is_reversed=is_reversed, quick=quick[is_reversed : is_reversed + 1],
         )  # fmt: skip
+
+
+def _mixed_key_cases() -> Iterator[Case]:
+    """Fast DDS says in its handshakes how its CA signs, and signs as its identity does."""
+    kinds = (("RSA", Algorithm.RSA, "EC", Algorithm.EC), ("EC", Algorithm.EC, "RSA", Algorithm.RSA))
+    for number, (theirs, authorities, own, algorithm) in enumerate(kinds):
+        for is_reversed in (False, True):
+            yield _case(
+                f"{own.lower()}-issued-by-{theirs.lower()}",
+                f"{own} identities that an authority with an {theirs} key issued", deliver, "encrypt-all",
+                algorithm=algorithm, authorities=authorities, is_reversed=is_reversed,
+                quick=(_DIRECTIONS[2 + (number + is_reversed) % 2],),
+            )  # fmt: skip
 
 
 def _sample_cases() -> Iterator[Case]:
@@ -214,4 +228,4 @@ async def _deliver_to_third(cast: Cast) -> None:
     await deliver_to_all(first, second)
 
 
-SECURED_CASES = (*_governance_cases(), *_rsa_cases(), *_sample_cases(), *_meeting_cases())
+SECURED_CASES = (*_governance_cases(), *_rsa_cases(), *_mixed_key_cases(), *_sample_cases(), *_meeting_cases())

@@ -110,10 +110,15 @@ class PeerKeystore:
     algorithm: Algorithm
 
     @classmethod
-    def create(cls, folder: Path, algorithm: Algorithm = Algorithm.EC) -> PeerKeystore:
-        """Authorities, alice, bob and dave with all rights, and all governance documents."""
+    def create(
+        cls, folder: Path, algorithm: Algorithm = Algorithm.EC, authorities: Algorithm | None = None
+    ) -> PeerKeystore:
+        """Authorities, alice, bob and dave with all rights, and all governance documents.
+
+        ``algorithm`` is that of the identities, and of the authorities too unless theirs is given.
+        """
         identity_ca, permissions_ca = (
-            Authority.create(parse_name(f"/O=Peers/CN={name}"), algorithm, _validity())
+            Authority.create(parse_name(f"/O=Peers/CN={name}"), authorities or algorithm, _validity())
             for name in ("identity_ca", "permissions_ca")
         )
         keystore = cls(folder, identity_ca, permissions_ca, algorithm)
@@ -160,11 +165,11 @@ class PeerKeystore:
 
 
 @functools.cache
-def shared_keystore(algorithm: Algorithm = Algorithm.EC) -> PeerKeystore:
+def shared_keystore(algorithm: Algorithm = Algorithm.EC, authorities: Algorithm | None = None) -> PeerKeystore:
     """The one of this run, which nobody may change; made when it is first asked for, removed at the end."""
     folder = Path(tempfile.mkdtemp(prefix="ddsi-keystore-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return PeerKeystore.create(folder, algorithm)
+    return PeerKeystore.create(folder, algorithm, authorities)
 
 
 def _validity() -> Validity:

@@ -55,9 +55,11 @@ class Expected:
         """
         certificate = Certificate.from_pem(theirs.c_id)
         authority = self.anchors.verify(certificate, self.now)
-        if signature_algorithm_named(theirs.c_dsign_algo) is not certificate.algorithm:
+        # Which algorithm it is, the certificate's key alone decides: Fast DDS (2.9) names here the one of its CA's key.
+        if signature_algorithm_named(theirs.c_dsign_algo) is None:
             raise NotTrusted(
-                f"it says to sign by {theirs.c_dsign_algo[:64]!r}, its certificate's key is {certificate.algorithm.key}"
+                f"it says to sign by {theirs.c_dsign_algo[:64]!r}, which is not known; "
+                f"its certificate's key is {certificate.algorithm.key}"
             )
         announced = ParticipantData.read(theirs.c_pdata)
         if announced.guid != self.guid:

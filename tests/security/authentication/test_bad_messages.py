@@ -91,15 +91,39 @@ def test_every_change_of_a_request_that_its_hash_covers_is_refused() -> None:
     assert all("bit of" in what for what in unnoticed)
 
 
-@pytest.mark.parametrize("name", [b"RSASSA-PSS-SHA256", b"ECDSA+P384+SHA384", b"ECDSA-SHA512", b"", b"\xff"])
-def test_a_signature_algorithm_that_is_not_the_certificate_s_is_refused(name: bytes) -> None:
+@pytest.mark.parametrize("name", [b"ECDSA-SHA512", b"RSASSA-PKCS1-V1_5", b"", b"\xff"])
+def test_a_signature_algorithm_that_nobody_knows_is_refused(name: bytes) -> None:
     both = pair()
     properties = tuple(
         (key, name if key == "c.dsign_algo" else octets)
         for key, octets in without_hashes(message(both.request())).binary_properties
     )
     reason = refusal(both.reply(DataHolder("DDS:Auth:PKI-DH:1.0+Req", (), properties)))
-    assert "its certificate's key is EC P-256" in reason
+    assert "not known; its certificate's key is EC P-256" in reason
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("EC", b"RSASSA-PSS-SHA256"), ("EC", b"ECDSA+P384+SHA384"), ("RSA", b"ECDSA-SHA256\0")]
+)
+def test_the_certificate_s_key_and_not_what_is_said_of_it_tells_how_it_signs(kind: str, name: bytes) -> None:
+    """Fast DDS says how its CA signs.  Nobody gains by it: the signature must be by the certificate's key."""
+    both = pair("EC", kind)
+    requested = both.request()
+    request = message(requested)
+    other = replace(Credentials.of(message(done(both.reply(request)))), c_dsign_algo=name)
+    values = AgreedValues(
+        hash_c1=required(request, "hash_c1"),
+        challenge1=required(request, "challenge1"),
+        dh1=required(request, "dh1"),
+        hash_c2=other.hash(),
+        challenge2=bytes(32),
+        dh2=ON_CURVE,
+    )
+    content = values.reply_content()
+    stolen = reply_token(other, values, both.initiator.identity.key.sign(content))
+    assert refusal(both.initiator.plugin.process_handshake(stolen, requested.handle))
+    genuine = reply_token(other, values, both.replier.identity.key.sign(content))
+    assert isinstance(settle(both.initiator.plugin.process_handshake(genuine, requested.handle)), HandshakeStep)
 
 
 def test_a_replier_cannot_choose_another_key_agreement() -> None:
