@@ -2,8 +2,9 @@
 
 RTPS 2.5 §8.4.10 knows a match that ended no more: when the lease of a participant runs out (a cable was pulled, a
 process stood still) and it is heard again, or when a writer and a reader part and meet again by a new partition, its
-writers are matched as if they were new, and those that keep history send it all once more.  To the application these would be the same samples twice.  So a reader remembers of each writer
-that it lost how far it had come, and drops what lies before.
+writers are matched as if they were new, and those that keep history send it all once more.  To the application these
+would be the same samples twice.  So a reader remembers of each writer that it lost how far it had come, and drops what
+lies before.
 
 A number alone does not tell a repeat from a sample of a writer that has restarted under its old GUID (stacks that make
 it of host and process number do so, in containers each time) and counts from 1 again.  Its samples are later ones, so
