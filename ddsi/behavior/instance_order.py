@@ -1,4 +1,4 @@
-"""InstanceOrder: the instances of a reader in the order of their handles.  DDS 1.4 §2.2.2.5.3.14 (read_next_instance).
+"""InstanceOrder: the instances of a reader in the order of their handles.  DDS 1.4 §2.2.2.5.3.16 (read_next_instance).
 
 The specification asks for some order that every instance has a place in, known or not, so that "the next one" can be
 told of an instance that is gone by now.  Handles are keys, so theirs serves.

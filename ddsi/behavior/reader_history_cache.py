@@ -36,6 +36,7 @@ from .sample_gate import SampleGate
 __all__ = ["Instance", "ReaderHistoryCache", "SampleSelector"]
 
 _COMPACT_ABOVE = 64
+_MAX_FORGOTTEN = 1024
 _NOT_NEW = ViewState.NOT_NEW
 _NEW = ViewState.NEW
 _ALIVE = InstanceState.ALIVE
@@ -92,6 +93,8 @@ class ReaderHistoryCache:
         self._withheld: dict[bytes, int] = {}  # by writer: the number that found none last
         self._by_source = isinstance(qos.destination_order, BySourceTimestamp)
         self._instances: dict[bytes, Instance] = {}
+        # Hashes of the keys of instances that were known; None: of too many to tell any more.
+        self._forgotten: set[int] | None = set()
         self._handles: InstanceOrder | None = None  # from when somebody asks for the next instance
         # In order of arrival.  What was taken from the middle or pushed out stays until it comes to the front
         # or the queue is compacted; such a sample has no change any more.
@@ -114,6 +117,10 @@ class ReaderHistoryCache:
     def instances(self) -> dict[bytes, Instance]:
         """The known instances by key.  For looking up only."""
         return self._instances
+
+    def may_have_known(self, key: bytes) -> bool:
+        """Is the instance known, or can it not be told that it never was?"""
+        return key in self._instances or self._forgotten is None or hash(key) in self._forgotten
 
     def qos_changed(self, qos: EndpointQos, now: float) -> None:
         """The reader's policies, as far as they may change, are now these.  DDS 1.4 §2.2.3."""
@@ -380,7 +387,7 @@ class ReaderHistoryCache:
     def _purge(self, instance: Instance) -> None:
         """Nobody writes it and nothing is left to take: forget it, so that instances come and go without end."""
         if not instance.samples and not instance.writers and instance.state is not _ALIVE:
-            self._instances.pop(instance.key, None)
+            self._drop_instance(instance.key)
             if self.is_withholding:  # where nobody takes anything, nobody else would notice that there is room
                 self._on_timer(-math.inf)
 
@@ -410,10 +417,18 @@ class ReaderHistoryCache:
 
     def _forget(self, key: bytes) -> None:
         """READER_DATA_LIFECYCLE, DDS 1.4 §2.2.3.22: the instance goes, with what was not taken of it."""
-        instance = self._instances.pop(key, None)
+        instance = self._drop_instance(key)
         if instance is not None:
             for info in list(instance.samples):
                 self._remove(instance, info)
+
+    def _drop_instance(self, key: bytes) -> Instance | None:
+        instance = self._instances.pop(key, None)
+        if instance is not None and self._forgotten is not None:
+            self._forgotten.add(hash(key))
+            if len(self._forgotten) > _MAX_FORGOTTEN:
+                self._forgotten = None
+        return instance
 
     # --- what goes out -----------------------------------------------------------------------------------
 
@@ -508,7 +523,7 @@ class ReaderHistoryCache:
         instance_states: int,
         selector: SampleSelector | None = None,
     ) -> bytes | None:
-        """The first instance behind ``previous`` (None: of all) that has any such sample.  DDS 1.4 §2.2.2.5.3.14."""
+        """The first instance behind ``previous`` (None: of all) that has any such sample.  DDS 1.4 §2.2.2.5.3.16."""
         if self._handles is None:
             self._handles = InstanceOrder(self._instances, self._instances)
         for key in self._handles.after(previous):

@@ -154,7 +154,7 @@ class DataReader(SampleReader[T], Endpoint):
     def get_key_value(self, handle: bytes) -> T:
         """A sample with the key of a known instance, the type's defaults elsewhere.  Raises BadParameter.
 
-        DDS 1.4 §2.2.2.5.3.28.
+        DDS 1.4 §2.2.2.5.3.29.
         """
         if handle not in self._history.instances:
             raise BadParameter(f"{self!r} knows no instance {handle!r}, or no longer")
@@ -173,7 +173,7 @@ class DataReader(SampleReader[T], Endpoint):
     async def wait_for_historical_data(self, timeout: float | None = None) -> None:
         """Until all that the matched transient-local writers held at the match has come.  Raises DdsTimeout.
 
-        DDS 1.4 §2.2.2.5.3.31.  Returns at once where no matched writer keeps history.
+        DDS 1.4 §2.2.2.5.3.32.  Returns at once where no matched writer keeps history.
         """
         self._check_open()
         scope = deadline_scope(timeout)
@@ -197,7 +197,7 @@ class DataReader(SampleReader[T], Endpoint):
 
         ``handle``: its Guid, of :meth:`matched_publications` or a sample's ``info.publication_handle``.  A writer of
         our own participant is known too.  Raises BadParameter when it is not matched, or no longer; a
-        BuiltinTopicReader still has the data of one that is gone.  DDS 1.4 §2.2.2.5.3 (get_matched_publication_data).
+        BuiltinTopicReader still has the data of one that is gone.  DDS 1.4 §2.2.2.5.3.33.
         """
         self._check_open()
         proxy = self._reader.behavior.writers.get(handle)
@@ -248,8 +248,8 @@ class DataReader(SampleReader[T], Endpoint):
             return self._deserialize_key(change.payload)
         return self._topic.type_support.sample_from_key(info.instance_handle)
 
-    def _begin_reading(self, max_samples: int | None) -> int | None:
-        max_samples = super()._begin_reading(max_samples)
+    def _begin_reading(self, max_samples: int | None, instance: bytes | None) -> int | None:
+        max_samples = super()._begin_reading(max_samples, instance)
         return self._parent._limit_of(self, max_samples) if isinstance(self._parent, Subscriber) else max_samples
 
     def _check_iterable(self) -> None:

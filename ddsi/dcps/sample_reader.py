@@ -115,12 +115,13 @@ class SampleReader(Entity, Generic[T]):
         """Samples that are here now, removed from the reader; never waits.
 
         ``max_samples``: at most so many, those that came first.  Masks select by state, ``condition`` brings masks of
-        its own, ``instance`` (an ``info.instance_handle``) selects one instance.  The samples of an instance follow
-        each other, oldest first; with ordered access to the whole topic (``Presentation``) all of them stand as they
-        came.  With access scope GROUP it is called within ``subscriber.access()``, and returns one sample at most where
-        access is ordered.  Raises PreconditionNotMet, AlreadyDeleted.
+        its own, ``instance`` (an ``info.instance_handle``; None: all) selects one instance: one that is gone has no
+        samples, one that was never known raises BadParameter (DDS 1.4 §2.2.2.5.3.15, take_instance).  The samples of an
+        instance follow each other, oldest first; with ordered access to the whole topic (``Presentation``) all of them
+        stand as they came.  With access scope GROUP it is called within ``subscriber.access()``, and returns one sample
+        at most where access is ordered.  Raises PreconditionNotMet, AlreadyDeleted.
         """
-        max_samples = self._begin_reading(max_samples)
+        max_samples = self._begin_reading(max_samples, instance)
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.accessed()
         sort_key = condition._sort_key if condition is not None else None
@@ -144,8 +145,11 @@ class SampleReader(Entity, Generic[T]):
         instance_states: int = ANY_INSTANCE_STATE,
         instance: bytes | None = None,
     ) -> list[Sample[T]]:
-        """As :meth:`take`, but the samples stay in the reader and count as read from now on."""
-        max_samples = self._begin_reading(max_samples)
+        """As :meth:`take`, but the samples stay in the reader and count as read from now on.
+
+        DDS 1.4 §2.2.2.5.3.8 (read), §2.2.2.5.3.14 (read_instance).
+        """
+        max_samples = self._begin_reading(max_samples, instance)
         states, selector = self._selection(condition, sample_states, view_states, instance_states)
         self._history.accessed()
         sort_key = condition._sort_key if condition is not None else None
@@ -171,7 +175,7 @@ class SampleReader(Entity, Generic[T]):
         """As :meth:`take`, of the first instance behind the handle ``previous`` that has such samples.
 
         None begins with the first of all, and the last one is followed by nothing.  ``previous`` need not be known any
-        more: handles have an order of their own.  DDS 1.4 §2.2.2.5.3.15.
+        more: handles have an order of their own.  DDS 1.4 §2.2.2.5.3.17.
         """
         states = (sample_states, view_states, instance_states)
         handle = self._next_instance(previous, condition, *states)
@@ -192,7 +196,7 @@ class SampleReader(Entity, Generic[T]):
         view_states: int = ANY_VIEW_STATE,
         instance_states: int = ANY_INSTANCE_STATE,
     ) -> list[Sample[T]]:
-        """As :meth:`take_next_instance`, but the samples stay and count as read.  DDS 1.4 §2.2.2.5.3.14."""
+        """As :meth:`take_next_instance`, but the samples stay and count as read.  DDS 1.4 §2.2.2.5.3.16."""
         states = (sample_states, view_states, instance_states)
         handle = self._next_instance(previous, condition, *states)
         if handle is None:
@@ -218,11 +222,16 @@ class SampleReader(Entity, Generic[T]):
 
     # --- inside ------------------------------------------------------------------------------------------
 
-    def _begin_reading(self, max_samples: int | None) -> int | None:
+    def _begin_reading(self, max_samples: int | None, instance: bytes | None) -> int | None:
         """May the application look now, and at how many samples at most?"""
         self._check_enabled()
         if max_samples is not None:
             check_count("max_samples", max_samples)
+        if instance is not None and not (isinstance(instance, bytes) and self._history.may_have_known(instance)):
+            raise BadParameter(
+                f"{self!r} has never known an instance {instance!r}: instance is the info.instance_handle of a sample "
+                "that was read here, or what lookup_instance(sample) returns"
+            )
         return max_samples
 
     def _tell(self) -> bool:

@@ -274,6 +274,19 @@ def test_instances_come_and_go_without_end() -> None:
     assert cache.instances == {}
 
 
+def test_what_was_never_known_can_be_told_from_what_is_gone_while_that_is_not_too_much() -> None:
+    cache = Cache()
+    for number in range(1100):
+        key = str(number).encode()
+        cache.put(key)
+        assert cache.may_have_known(key)
+        cache.put(key, UNREGISTER)
+        cache.take()
+        assert key not in cache.instances
+        assert cache.may_have_known(b"0")
+        assert cache.may_have_known(b"never") == (number >= 1024)
+
+
 def test_a_lost_writer_takes_only_its_own_instances() -> None:
     cache = Cache()
     cache.put(b"a", by=W1)

@@ -171,9 +171,37 @@ async def test_an_instance_is_selected_by_its_handle(domain: int) -> None:
         assert red is not None
         assert [s.data.x for s in p.reader.take(instance=red)] == [1, 2]
         assert p.reader.lookup_instance(Shape("GREEN")) is None
-        assert p.reader.take(instance=b"nobody") == []
         (blue,) = p.reader.read()
         assert colors(p.reader.take(instance=blue.info.instance_handle)) == ["BLUE"]
+
+
+@in_trio
+async def test_an_instance_that_was_never_known_is_refused_by_name(domain: int) -> None:
+    """DDS 1.4 §2.2.2.5.3.14.  A key that its writer alone knows, a sample, a word: none is an instance here."""
+    async with pair(domain, local=True) as p:
+        await arrived(p, Shape("RED", 1))
+        green = p.writer.register_instance(Shape("GREEN"))
+        wrong: Any
+        for wrong in (green, b"", "RED", Shape("RED")):
+            for look in (p.reader.take, p.reader.read):
+                with pytest.raises(ddsi.BadParameter, match=r"of 'Square'.*never known an instance .*lookup_instance"):
+                    look(instance=wrong)
+        assert colors(p.reader.take()) == ["RED"]
+
+
+@in_trio
+async def test_an_instance_that_is_gone_has_no_samples(domain: int) -> None:
+    """Who takes in rounds until nothing is left is not punished for having taken the end of the instance."""
+    async with pair(domain, local=True) as p:
+        await arrived(p, Shape("RED", 1))
+        red = p.reader.read()[0].info.instance_handle
+        await p.writer.unregister(Shape("RED"))
+        rounds = 0
+        while p.reader.take(1, instance=red):
+            rounds += 1
+        assert rounds == 2, "the sample and the end"
+        assert p.reader.lookup_instance(Shape("RED")) is None
+        assert p.reader.read(instance=red) == []
 
 
 @in_trio
