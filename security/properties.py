@@ -14,6 +14,8 @@ from ddsi.spi import SECURITY_PROPERTY_PREFIX
 from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.qos_policies import BinaryProperty, Properties, Property
 
+from .resources import resource_name
+
 __all__ = [
     "ACCESS_PLUGIN",
     "AUTH_PLUGIN",
@@ -119,11 +121,17 @@ def security_properties(properties: Properties) -> dict[str, str]:
         if canonical not in _NAMES and not canonical.startswith(own):
             raise ConfigurationError(_unknown(name, canonical))
         text = _text(name, value)
-        if found.setdefault(canonical, text) != text:
+        if not _are_alike(found.setdefault(canonical, text), text):
             raise ConfigurationError(
                 f"property {canonical} is given twice, in two spellings, with different values: keep one"
             )
     return found
+
+
+def _are_alike(one: str, other: str) -> bool:
+    """``file:/x`` is how Cyclone DDS is told of a file, ``file:///x`` how Fast DDS is."""
+    files = one.startswith("file:") and other.startswith("file:")
+    return one == other or (files and resource_name(one) == resource_name(other))
 
 
 def _canonical(name: str) -> str:

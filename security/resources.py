@@ -1,13 +1,16 @@
 """Reads what a property points to: certificates, keys and documents, by URI.  DDS-Security 1.1 §9.3.1, §9.4.1.
 
-``file:`` with a path, absolute or not, with or without ``//`` before it, and ``data:,`` with the text itself.  A
-``pkcs11:`` URI names an object in a hardware token and is not read, so it is refused here.
+``file:`` with a path, absolute or not, with or without ``//`` before it, and ``data:,`` with the text itself.  The path
+is taken as it is, as all stacks do, and where there is no such file, as a URI has it (``%20``, as ``Path.as_uri``
+writes).  A ``pkcs11:`` URI names an object in a hardware token and is not read, so it is refused here.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Final
+from urllib.parse import unquote
 
 from ddsi.structure.errors import ConfigurationError
 
@@ -22,7 +25,7 @@ def read_resource(name: str, uri: str) -> bytes:
     if uri.startswith("data:,"):
         octets = uri.removeprefix("data:,").encode()
     elif uri.startswith("file:"):
-        octets = _read_file(name, resource_name(uri))
+        octets = _read_file(name, _existing(resource_name(uri)))
     else:
         # Nothing of a value that may be a secret in the wrong place is shown, unless it is a scheme that we know.
         scheme = uri.partition(":")[0]
@@ -43,6 +46,10 @@ def resource_name(uri: str) -> str:
         path = uri.removeprefix("file:")
         return path.removeprefix("//") if path.startswith("//") else path
     return f"the {uri.partition(':')[0]}: URI"
+
+
+def _existing(path: str) -> str:
+    return unquote(path) if "%" in path and not os.path.exists(path) else path
 
 
 def _read_file(name: str, path: str) -> bytes:

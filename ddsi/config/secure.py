@@ -7,13 +7,13 @@ makes.  Nothing is read here but the names: files are read, and verified, when t
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 
 from ..structure.errors import ConfigurationError
 from ..structure.qos import Qos
 from ..structure.qos_policies import Properties, Property
 from .config import Config
+from .meanings import SECURITY
 
 __all__ = ["participant_properties", "secure"]
 
@@ -25,7 +25,8 @@ _FILES = {
     "dds.sec.access.governance": "governance.p7s",
     "dds.sec.access.permissions": "permissions.p7s",
 }
-_PREFIX = "dds.sec."
+_WORDS = frozenset(SECURITY.values())
+"""The properties that ``<Security>`` can say."""
 
 
 def secure(keystore: str | os.PathLike[str], *, password: str | None = None) -> Qos:
@@ -59,18 +60,19 @@ def _why_not(folder: Path, missing: list[str]) -> str:
 def participant_properties(qos: Properties | None, config: Config) -> Properties:
     """The properties of a participant: those of its QoS, and those that ``<Security>`` of ``DDSI_URI`` stands for.
 
-    Raises ConfigurationError where both configure security, and not alike: which of them is meant cannot be told.
+    What ``<Security>`` has no word for, such as logging, the QoS may add.  Raises ConfigurationError where both say who
+    the participant is and what it may do, and not alike: which of them is meant cannot be told.  (A QoS may say it in
+    another stack's spelling; who reads the properties finds what contradicts itself then.)
     """
-    given: Mapping[str, object] = qos or {}
-    configured = {name: Property(value) for name, value in config.security}
-    by_qos = {name: value for name, value in given.items() if name.startswith(_PREFIX)}
+    given = qos or {}
+    configured = dict(config.security)
+    said = {name: value.value if isinstance(value, Property) else value for name, value in given.items()}
+    by_qos = {name: said[name] for name in _WORDS & said.keys()}
     if configured and by_qos:
-        said = {name: value.value if isinstance(value, Property) else value for name, value in by_qos.items()}
-        different = sorted(name for name, value in config.security if said.get(name) != value)
-        different += sorted(name for name in said if name not in configured and ".library." not in name)
+        different = sorted(name for name in configured | by_qos if configured.get(name) != by_qos.get(name))
         if different:
             raise ConfigurationError(
                 f"security is configured twice and not alike, by the participant's QoS and by <Security> of the "
                 f"configuration: {', '.join(different)}; keep one of the two"
             )
-    return {**configured, **(qos or {})}
+    return {**{name: Property(value) for name, value in configured.items()}, **given}

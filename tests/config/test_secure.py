@@ -140,3 +140,15 @@ def test_one_that_is_only_in_the_configuration_is_a_difference_too() -> None:
     given = {name: value for name, value in PROPERTIES.items() if name != "dds.sec.auth.password"}
     with pytest.raises(ConfigurationError, match=r"dds\.sec\.auth\.password"):
         participant_properties(given, configured())
+
+
+@pytest.mark.parametrize("name", ["dds.sec.log.log_level", "dds.sec.crypto.keysize", "dds.sec.auth.library.path"])
+def test_the_qos_may_add_what_the_configuration_has_no_word_for(name: str) -> None:
+    both = participant_properties({name: "x"}, configured())
+    assert both[name] == "x"
+    assert both["dds.sec.auth.password"] == Property("secret word")
+
+
+def test_another_stack_s_spelling_is_left_to_who_knows_it() -> None:
+    name = "dds.sec.access.builtin.Access-Permissions.governance"
+    assert participant_properties({name: "file:other"}, configured()).keys() == {name, *PROPERTIES}

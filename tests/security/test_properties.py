@@ -38,6 +38,14 @@ def test_the_same_twice_is_accepted_and_two_values_are_not() -> None:
         security_properties(both | {"dds.sec.auth.private_key": "file:b"})
 
 
+def test_one_file_in_the_form_of_each_stack_is_the_same() -> None:
+    theirs, ours = "dds.sec.auth.builtin.PKI-DH.private_key", "dds.sec.auth.private_key"
+    for one, other in (("file:/k/a", "file:///k/a"), ("file:///k/a", "file:/k/a")):
+        assert security_properties({theirs: one, ours: other}) == {ours: one}
+    with pytest.raises(ConfigurationError, match="given twice"):
+        security_properties({theirs: "file:/k/a", ours: "file:///k/b"})
+
+
 def test_an_unknown_name_is_refused_with_the_nearest_known_one() -> None:
     with pytest.raises(
         ConfigurationError, match=r"identity_certificat: did you mean dds\.sec\.auth\.identity_certificate"
@@ -63,6 +71,14 @@ def test_octets_are_no_text() -> None:
 def test_a_file_is_read_with_and_without_slashes(form: str, tmp_path: Path) -> None:
     (tmp_path / "ca.pem").write_bytes(b"content")
     assert read_resource("p", form.format(tmp_path / "ca.pem")) == b"content"
+
+
+def test_a_path_may_be_written_as_a_uri_has_it_unless_there_is_such_a_file(tmp_path: Path) -> None:
+    spaced, literal = tmp_path / "my ca.pem", tmp_path / "my%20ca.pem"
+    spaced.write_bytes(b"spaced")
+    assert read_resource("p", spaced.as_uri()) == b"spaced"
+    literal.write_bytes(b"literal")
+    assert read_resource("p", f"file:{literal}") == b"literal"
 
 
 def test_data_is_its_own_content() -> None:
