@@ -15,6 +15,7 @@ from ..structure.cache_change import ChangeKind, StatusInfo
 from ..structure.errors import BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.guid import Guid
 from ..structure.qos import EndpointQos, Qos, writer_qos
+from ..structure.qos_concerns import QosOwner
 from ..structure.qos_policies import BySourceTimestamp, DataRepresentation, DataRepresentationId
 from ..structure.status import (
     InconsistentTopic,
@@ -46,6 +47,7 @@ Timestamp = float | datetime
 class DataWriter(Endpoint, Generic[T]):
     """Writes samples of a topic; created without waiting, closed with its participant or by ``close()``."""
 
+    _QOS_OWNER: ClassVar[QosOwner] = "writer"
     STATUSES: ClassVar[tuple[type, ...]] = (
         PublicationMatched,
         OfferedIncompatibleQos,

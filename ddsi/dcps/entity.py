@@ -22,6 +22,7 @@ from ..structure.errors import (
 )
 from ..structure.guid import Guid
 from ..structure.qos import Qos
+from ..structure.qos_concerns import QosOwner, unused_policies
 from ..structure.status import DataAvailable, DataOnReaders, Status
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class Entity:
 
     STATUSES: ClassVar[tuple[type, ...]] = ()
     """The kinds of status that such an entity has, and of its events."""
+    _QOS_OWNER: ClassVar[QosOwner] = "topic"
 
     def __init__(self, qos: Qos | None) -> None:
         if qos is not None and not isinstance(qos, Qos):
@@ -96,6 +98,14 @@ class Entity:
     def qos(self) -> Qos:
         """The Qos that the entity was given, and what it has from others; changed by :meth:`set_qos`."""
         return self._qos
+
+    @property
+    def unused_policies(self) -> tuple[str, ...]:
+        """The names of the policies that it was given and that mean nothing to such an entity.  DDS 1.4 §2.2.3.
+
+        A Qos may be shared: a writer takes no notice of its time_based_filter, nor a reader of its lifespan.
+        """
+        return unused_policies(self._own_qos, self._QOS_OWNER)
 
     def set_qos(self, qos: Qos) -> None:
         """Change the policies that ``qos`` sets; all others stay as they are.  DDS 1.4 §2.2.2.1.1.3.

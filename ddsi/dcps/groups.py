@@ -16,6 +16,7 @@ from ..engine import LocalWriter
 from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, PreconditionNotMet
 from ..structure.qos import Qos
 from ..structure.qos_changes import check_changeable
+from ..structure.qos_concerns import QosOwner
 from ..structure.qos_policies import AccessScope
 from ..structure.sample_info import ANY_INSTANCE_STATE, ANY_SAMPLE_STATE, ANY_VIEW_STATE, SampleState
 from ..structure.status import DataAvailable, DataOnReaders
@@ -81,6 +82,8 @@ class _Group(Parent):
 
 class Publisher(_Group):
     """The writers created with it have its policies wherever they do not set their own."""
+
+    _QOS_OWNER: ClassVar[QosOwner] = "publisher"
 
     def __init__(self, participant: DomainParticipant, qos: Qos | None = None) -> None:
         super().__init__(participant, qos)
@@ -175,6 +178,7 @@ class Publisher(_Group):
 class Subscriber(_Group):
     """The readers created with it have its policies wherever they do not set their own."""
 
+    _QOS_OWNER: ClassVar[QosOwner] = "subscriber"
     STATUSES: ClassVar[tuple[type, ...]] = (DataOnReaders,)
 
     def __init__(self, participant: DomainParticipant, qos: Qos | None = None) -> None:

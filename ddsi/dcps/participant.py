@@ -36,6 +36,7 @@ from ..structure.errors import AlreadyDeleted, BadParameter, DdsTimeout, Precond
 from ..structure.guid import Guid
 from ..structure.qos import Qos
 from ..structure.qos_changes import check_changeable
+from ..structure.qos_concerns import QosOwner
 from ..structure.status import SecurityRefused, SecurityRevoked
 from ..transport import Pump, PumpOptions
 from .endpoint import Endpoint
@@ -70,6 +71,7 @@ class DomainParticipant(Parent):
     Everything created with it is closed with it.
     """
 
+    _QOS_OWNER: ClassVar[QosOwner] = "participant"
     STATUSES: ClassVar[tuple[type, ...]] = (SecurityRefused, SecurityRevoked)
 
     def __init__(

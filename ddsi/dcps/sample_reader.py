@@ -15,6 +15,7 @@ from ..behavior.reader_history_cache import ReaderHistoryCache, SampleSelector
 from ..structure.cache_change import CacheChange
 from ..structure.errors import BadParameter, PreconditionNotMet
 from ..structure.qos import Qos
+from ..structure.qos_concerns import QosOwner
 from ..structure.sample_info import (
     ANY_INSTANCE_STATE,
     ANY_SAMPLE_STATE,
@@ -44,6 +45,7 @@ _UNREAD = ReadCondition(sample_states=SampleState.NOT_READ)
 class SampleReader(Entity, Generic[T]):
     """The base of DataReader and BuiltinTopicReader."""
 
+    _QOS_OWNER: ClassVar[QosOwner] = "reader"
     STATUSES: ClassVar[tuple[type, ...]] = (DataAvailable,)
 
     _history: ReaderHistoryCache

@@ -58,6 +58,11 @@ class EntityPortal:
         """The Qos that the entity has."""
         return self._entity.qos
 
+    @property
+    def unused_policies(self) -> tuple[str, ...]:
+        """The names of the policies that it was given and that mean nothing to such an entity."""
+        return self._entity.unused_policies
+
     def set_qos(self, qos: Qos) -> None:
         """Change the policies that ``qos`` sets: see ``ddsi.Entity.set_qos``."""
         self._ask(partial(self._entity.set_qos, qos))

@@ -14,6 +14,8 @@ import ddsi
 from ddsi.dcps import conditions
 from ddsi.structure import status
 from ddsi.structure.qos_changes import CHANGEABLE
+from ddsi.structure.qos_concerns import QosOwner, unused_policies
+from tests.structure.test_qos_concerns import EVERYTHING
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs/dcps.md").read_text(encoding="utf-8")
@@ -48,6 +50,12 @@ def test_every_policy_has_its_line() -> None:
 def test_the_column_of_changes_is_that_of_the_code() -> None:
     assert {names(row[0])[0] for row in rows("Policies") if row[1] == "yes"} == CHANGEABLE
     assert {row[1] for row in rows("Policies")} == {"yes", "-"}
+
+
+@pytest.mark.parametrize(("owner", "other"), [("writers", "reader"), ("readers", "writer")])
+def test_the_policies_of_writers_alone_and_of_readers_alone_are_those_of_the_code(owner: str, other: QosOwner) -> None:
+    (line,) = [line for line in TEXT.splitlines() if line.startswith(f"- Of {owner} alone: ")]
+    assert {*names(line), "entity_factory"} == set(unused_policies(EVERYTHING, other))
 
 
 def test_every_status_has_its_line_and_its_entities() -> None:

@@ -238,6 +238,25 @@ async def test_partitions_of_publisher_and_subscriber_decide_who_meets(domain: i
 
 
 @in_trio
+async def test_a_shared_qos_is_taken_by_all_and_each_names_what_it_has_no_use_for(domain: int) -> None:
+    shared = RELIABLE | ddsi.Qos(lifespan=ddsi.Lifespan(1), time_based_filter=ddsi.TimeBasedFilter(0.1))
+    async with ddsi.DomainParticipant(domain, qos=ddsi.Qos(deadline=ddsi.Deadline(1))) as participant:
+        topic = ddsi.Topic(participant, "Square", Shape, ddsi.Qos(lifespan=ddsi.Lifespan(2)))
+        writer, reader = ddsi.DataWriter(participant, topic, shared), ddsi.DataReader(participant, topic, shared)
+        groups = ddsi.Publisher(participant, shared), ddsi.Subscriber(participant, shared)
+        assert participant.unused_policies == ("deadline",)
+        assert topic.unused_policies == ()
+        assert [entity.unused_policies for entity in (writer, *groups, reader)] == [
+            ("time_based_filter",),
+            ("time_based_filter",),
+            ("lifespan",),
+            ("lifespan",),
+        ]
+        reader.set_qos(ddsi.Qos(transport_priority=ddsi.TransportPriority(1)))
+        assert reader.unused_policies == ("lifespan", "transport_priority")
+
+
+@in_trio
 async def test_contradicting_policies_are_refused_and_nothing_is_created(domain: int) -> None:
     mad = ddsi.Qos(history=ddsi.KeepLast(10), resource_limits=ddsi.ResourceLimits(max_samples_per_instance=5))
     async with ddsi.DomainParticipant(domain) as participant:
