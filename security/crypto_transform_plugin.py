@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Protocol, runtime_checkable
 
-from ddsi.spi import Octets, Outcome, Overhead, Refused
+from ddsi.spi import Octets, Outcome, Overhead, Parts, Refused
 from ddsi.structure.dataclass import dataclass
 
 from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
@@ -42,8 +42,9 @@ class SecureSubmessage:
 class CryptoTransform(Protocol):
     """Protects what is sent and opens what is received.  §8.5.1.9; called by the service for each message.
 
-    Encoders append to a buffer of the caller's, which they leave as it was when they refuse; a refusal means that
-    nothing is sent.  They encode for all receivers at once: the OMG's ``..._list_index`` has no part here.
+    Encoders take and return octets in parts, as they go to the socket: large ones are not copied that need not be.  A
+    refusal means that nothing is sent.  They encode for all receivers at once: the OMG's ``..._list_index`` has no part
+    here.
     Decoders return the plain octets, or why there are none: not for us, no keys, rejected.  They may write into the
     octets that they are given, where these can be written to, and return parts of them: nobody reads them again.
     What they return is read before the same decoder is called for the next one, and not after.
@@ -62,41 +63,37 @@ class CryptoTransform(Protocol):
 
     def encode_serialized_payload(
         self,
-        encoded_buffer: bytearray,
         extra_inline_qos: bytearray,
         plain_buffer: Octets,
         sending_datawriter_crypto: DatawriterCryptoHandle,
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.1.  A whole SerializedPayload, or one run of its fragments."""
         ...
 
     def encode_datawriter_submessage(
         self,
-        encoded_rtps_submessage: bytearray,
-        plain_rtps_submessage: Octets,
+        plain_rtps_submessage: Parts,
         sending_datawriter_crypto: DatawriterCryptoHandle,
         receiving_datareader_crypto_list: Sequence[DatareaderCryptoHandle],
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.2.  A writer's submessage with its header in, SEC_PREFIX to SEC_POSTFIX out."""
         ...
 
     def encode_datareader_submessage(
         self,
-        encoded_rtps_submessage: bytearray,
-        plain_rtps_submessage: Octets,
+        plain_rtps_submessage: Parts,
         sending_datareader_crypto: DatareaderCryptoHandle,
         receiving_datawriter_crypto_list: Sequence[DatawriterCryptoHandle],
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.3.  A reader's submessage with its header in, SEC_PREFIX to SEC_POSTFIX out."""
         ...
 
     def encode_rtps_message(
         self,
-        encoded_rtps_message: bytearray,
-        plain_rtps_message: Octets,
+        plain_rtps_message: Parts,
         sending_participant_crypto: ParticipantCryptoHandle,
         receiving_participant_crypto_list: Sequence[ParticipantCryptoHandle],
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.4.  A message with its RTPS header, in and out."""
         ...
 

@@ -8,7 +8,8 @@ and without the former, anybody for anyone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from ddsi.messages.raw_submessage import SubmessageKind
@@ -48,6 +49,7 @@ _IMPOSSIBLE: Final = 1 << 8
 _DATAREADER_SUBMESSAGE: Final = SecureSubmessageCategory.DATAREADER_SUBMESSAGE
 _ENDS_BY_HASH_ALONE: Final = frozenset((FAST_DDS, RTI, RTI_MICRO))
 """They dispose and unregister without a payload, so nothing is there that could be protected."""
+_NO_RECEIVER: Final = Refused("none of the receivers has a key")
 _UNPROVEN_END: Final = Rejected("it ends an instance, and nothing of it is protected")
 _ALIKE: Final = 16
 """So many octets at the head of a protected submessage tell the sender, the key and the session."""
@@ -59,6 +61,7 @@ _SMALL: Final = 1 << 12
 """Octets are quicker to take apart as ``bytes`` than through a view, unless it costs more to copy them."""
 
 
+Encoder = Callable[[Parts], Parts | Refused]
 Opener = Callable[[Octets], Octets | None]
 
 
@@ -80,9 +83,10 @@ class Protection:
         self._local_endpoints = local_endpoints
         self._remotes = remotes
         self._keys = keys
-        self._handles: dict[
-            tuple[Guid, tuple[Guid, ...]], tuple[list[DatareaderCryptoHandle], list[DatawriterCryptoHandle]]
-        ] = {}
+        self._submessage_encoders: dict[tuple[Guid, tuple[Guid, ...]], Encoder] = {}
+        """By sender and receivers."""
+        self._message_encoders: dict[tuple[Guid, ...], Encoder] = {}
+        """By receivers."""
         self._short_ways = cryptographic if isinstance(cryptographic, OpensAlike) else None
         self._message_openers: dict[bytes, tuple[bytes, Opener, RemoteParticipant]] = {}
         """By source: what followed the header of its last message, and what opened it."""
@@ -90,6 +94,8 @@ class Protection:
         """By source and first octets of submessages: what opened the last of these, and whose they are."""
         self._payload_openers: dict[Guid, tuple[bytes, Opener]] = {}
         """By remote writer: how its last payload began, and what opened it."""
+        self._payload_pairs: dict[Guid, Pair | None] = {}
+        """By remote writer: with whom it shares the key of its payloads; None where they are in clear."""
         self._required: dict[bytes, int] = {}
         """What the submessages of a remote endpoint need; by its Guid, until anything about it changes."""
         self.refused = 0
@@ -98,14 +104,16 @@ class Protection:
     def changed(self) -> None:
         """Endpoints or participants came or went."""
         self._required.clear()
-        self._handles.clear()
+        self._submessage_encoders.clear()
+        self._message_encoders.clear()
         self._message_openers.clear()
         self._openers.clear()
         self._payload_openers.clear()
+        self._payload_pairs.clear()
 
     # --- outwards ----------------------------------------------------------------------------------------
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         endpoint, count = self._local_endpoints.get(sender), max(len(receivers), 1)
         payload = submessage = message = 0
         if endpoint is not None and endpoint.handle is not None:
@@ -121,56 +129,64 @@ class Protection:
             return payload
         handle = endpoint.handle
         assert isinstance(handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
-        encoded = bytearray()
-        refusal = self._cryptographic.encode_serialized_payload(encoded, bytearray(), payload, handle)
-        assert refusal is None, refusal
-        return encoded
+        encoded = self._cryptographic.encode_serialized_payload(bytearray(), payload, handle)
+        assert not isinstance(encoded, Refused), encoded
+        return encoded[0] if len(encoded) == 1 else b"".join(encoded)
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
+        key = (sender, receivers)
+        encode = self._submessage_encoders.get(key)
+        if encode is None:
+            encode = self._submessage_encoders[key] = self._submessage_encoder(sender, receivers)
+        encoded = encode(submessage)
+        return self._nothing() if isinstance(encoded, Refused) else encoded
+
+    def _submessage_encoder(self, sender: Guid, receivers: tuple[Guid, ...]) -> Encoder:
+        """The same for every submessage of this sender to them, until somebody comes or goes."""
         endpoint = self._local_endpoints.get(sender)
         if endpoint is None or not endpoint.attributes.is_submessage_protected:
-            return submessage
-        encoded = bytearray()
-        plain = submessage[0] if len(submessage) == 1 else b"".join(submessage)
-        readers, writers = self._receivers(sender, receivers)
-        refusal: Refused | None
-        if isinstance(endpoint.handle, DatawriterCryptoHandle) and readers:
-            refusal = self._cryptographic.encode_datawriter_submessage(encoded, plain, endpoint.handle, readers)
-        elif isinstance(endpoint.handle, DatareaderCryptoHandle) and writers:
-            refusal = self._cryptographic.encode_datareader_submessage(encoded, plain, endpoint.handle, writers)
-        else:
-            return self._nothing()
-        return (encoded,) if refusal is None else self._nothing()
-
-    def _receivers(
-        self, sender: Guid, receivers: Sequence[Guid]
-    ) -> tuple[list[DatareaderCryptoHandle], list[DatawriterCryptoHandle]]:
-        """The handles of those that have keys; the same for every sample until somebody comes or goes."""
-        key = (sender, tuple(receivers))
-        found = self._handles.get(key)
-        if found is None:
-            pairs = (self._keys.pairs.get((sender, receiver)) for receiver in receivers)
-            handles = [pair.handle for pair in pairs if pair is not None and pair.is_open]
-            found = self._handles[key] = (
-                [handle for handle in handles if isinstance(handle, DatareaderCryptoHandle)],
-                [handle for handle in handles if isinstance(handle, DatawriterCryptoHandle)],
+            return _leave_it
+        pairs = (self._keys.pairs.get((sender, receiver)) for receiver in receivers)
+        handles = [pair.handle for pair in pairs if pair is not None and pair.is_open]
+        handle, cryptographic = endpoint.handle, self._cryptographic
+        readers = [handle for handle in handles if isinstance(handle, DatareaderCryptoHandle)]
+        writers = [handle for handle in handles if isinstance(handle, DatawriterCryptoHandle)]
+        if isinstance(handle, DatawriterCryptoHandle) and readers:
+            return partial(
+                cryptographic.encode_datawriter_submessage,
+                sending_datawriter_crypto=handle,
+                receiving_datareader_crypto_list=readers,
             )
-        return found
+        if isinstance(handle, DatareaderCryptoHandle) and writers:
+            return partial(
+                cryptographic.encode_datareader_submessage,
+                sending_datareader_crypto=handle,
+                receiving_datawriter_crypto_list=writers,
+            )
+        return _refuse_it
 
-    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
-        if not self._is_rtps_protected or not receivers or receivers[0].entity_id in NEVER_IN_MESSAGES:
+    def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
+        if not self._is_rtps_protected:
             return message
-        participants = {receiver[:12]: None for receiver in receivers}
-        handles = [
-            remote.crypto
-            for remote in (self._remotes.get(prefix) for prefix in participants)
-            if remote is not None and remote.crypto is not None
-        ]
+        encode = self._message_encoders.get(receivers)
+        if encode is None:
+            encode = self._message_encoders[receivers] = self._message_encoder(receivers)
+        encoded = encode(message)
+        return self._nothing() if isinstance(encoded, Refused) else encoded
+
+    def _message_encoder(self, receivers: tuple[Guid, ...]) -> Encoder:
+        """The same of messages to them."""
+        if not receivers or receivers[0].entity_id in NEVER_IN_MESSAGES:
+            return _leave_it
+        remotes = (self._remotes.get(prefix) for prefix in dict.fromkeys(receiver[:12] for receiver in receivers))
+        handles = [remote.crypto for remote in remotes if remote is not None and remote.crypto is not None]
         if not handles:
-            return self._nothing()
-        encoded = bytearray()
-        refusal = self._cryptographic.encode_rtps_message(encoded, b"".join(message), self._local_participant, handles)
-        return (encoded,) if refusal is None else self._nothing()
+            return _refuse_it
+        return partial(
+            self._cryptographic.encode_rtps_message,
+            sending_participant_crypto=self._local_participant,
+            receiving_participant_crypto_list=handles,
+        )
 
     def _nothing(self) -> Parts:
         self.refused += 1
@@ -209,9 +225,9 @@ class Protection:
         if known is not None:
             opener, pair = known
             plain = opener(protected)
-            if plain is not None and self._speaks_for_itself(plain, pair):
+            if plain is not None:
                 pair.participant.opened += 1
-                return plain
+                return plain if _names(plain, pair.remote_entity) else _speaks_for_another(pair)
         return self._decode_submessage(protected, source)
 
     def _decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
@@ -237,9 +253,12 @@ class Protection:
             plain = self._cryptographic.decode_datareader_submessage(protected, receiver, sender)
         if isinstance(plain, Outcome):
             return plain
+        if len(plain) < _SUBMESSAGE_HEADER:
+            return Rejected("what was protected is no submessage")
         remote.opened += 1
-        if not self._speaks_for_itself(plain, pair):
-            return Rejected(f"it was protected by {pair.remote}, and speaks for another")
+        # One key protects both directions' submessages on the volatile topic.
+        if not (_is_volatile(plain) if pair.is_volatile else _names(plain, pair.remote_entity)):
+            return _speaks_for_another(pair)
         if pair.is_volatile and remote.handshake is not None:
             # Only who shares the secret can have said that.  A peer may have no key for us (OpenDDS), but it answers.
             remote.handshake.confirm()
@@ -257,18 +276,6 @@ class Protection:
         if pair is None or pair.is_open:
             return pair
         return next((other for other in self._keys.by_remote[pair.remote] if other.is_open), None)
-
-    def _speaks_for_itself(self, plain: Octets, pair: Pair) -> bool:
-        """Is the sender that a submessage names the one whose key opened it?  INFO_TS names none (Fast DDS)."""
-        if len(plain) < _SUBMESSAGE_HEADER:
-            return False
-        start = _SENDER.get(plain[0])
-        if start is None:
-            return plain[0] == _INFO_TS
-        named = plain[start : start + 4]
-        if pair.is_volatile:  # one key protects both directions' submessages
-            return bytes(named) in NEVER_IN_MESSAGES and named[0] == 0xFF
-        return named == pair.remote_entity
 
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
         if len(payload) < _SMALL:
@@ -311,13 +318,15 @@ class Protection:
 
     def _payload_pair(self, writer: Guid) -> Pair | None:
         """One that is open, if there is any."""
-        found = None
-        for pair in self._keys.by_remote.get(writer, ()):
-            if pair.local.attributes.is_payload_protected:
-                if pair.is_open:
-                    return pair
-                found = pair
-        return found
+        try:
+            return self._payload_pairs[writer]
+        except KeyError:
+            pairs = [
+                pair for pair in self._keys.by_remote.get(writer, ()) if pair.local.attributes.is_payload_protected
+            ]
+            found = max(pairs, key=lambda pair: pair.is_open, default=None)
+            self._payload_pairs[writer] = found
+            return found
 
     # --- what must be protected --------------------------------------------------------------------------
 
@@ -344,6 +353,33 @@ class Protection:
         if entity in PLAIN_BUILTIN and remote.data.vendor_id == _CYCLONE_DDS:
             return required
         return required | _MESSAGE
+
+
+def _names(submessage: Octets, entity: bytes) -> bool:
+    """Is this the sender that a submessage names?  INFO_TS names none (Fast DDS)."""
+    start = _SENDER.get(submessage[0])
+    return submessage[0] == _INFO_TS if start is None else submessage[start : start + 4] == entity
+
+
+def _is_volatile(submessage: Octets) -> bool:
+    """Is it of one of the two endpoints of the volatile topic?"""
+    start = _SENDER.get(submessage[0])
+    if start is None:
+        return submessage[0] == _INFO_TS
+    named = bytes(submessage[start : start + 4])
+    return named in NEVER_IN_MESSAGES and named[0] == 0xFF
+
+
+def _speaks_for_another(pair: Pair) -> Rejected:
+    return Rejected(f"it was protected by {pair.remote}, and speaks for another")
+
+
+def _leave_it(parts: Parts) -> Parts:
+    return parts
+
+
+def _refuse_it(parts: Parts) -> Refused:
+    return _NO_RECEIVER
 
 
 def _no_keys(octets: Octets, offset: int) -> NoKeys:

@@ -321,10 +321,10 @@ class SecurityService:
 
     # --- octets: bound to Protection once there is a participant -------------------------------------------
 
-    overhead: Callable[[Guid, Sequence[Guid]], Overhead]
+    overhead: Callable[[Guid, tuple[Guid, ...]], Overhead]
     encode_payload: Callable[[Guid, Octets], Octets]
-    encode_submessage: Callable[[Guid, Sequence[Guid], Parts], Parts]
-    encode_message: Callable[[Sequence[Guid], Parts], Parts]
+    encode_submessage: Callable[[Guid, tuple[Guid, ...], Parts], Parts]
+    encode_message: Callable[[tuple[Guid, ...], Parts], Parts]
     decode_message: Callable[[Octets, GuidPrefix], Octets | Outcome]
     decode_submessage: Callable[[Octets, GuidPrefix], Octets | Outcome]
     decode_payload: Callable[[Guid, Octets], Octets | Outcome]

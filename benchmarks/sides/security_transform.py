@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from functools import partial
 
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from benchmarks.sides.bursts import Operation, quickest
 from benchmarks.sides.protocol import play
-from ddsi.spi import Outcome
+from ddsi.spi import Outcome, Parts, Refused
 from ddsi_security.attributes import EndpointSecurityAttributes, ParticipantSecurityAttributes
 from ddsi_security.cryptographic import AesGcmGmac
 from ddsi_security.cryptographic.crypto_handles import (
@@ -77,42 +78,27 @@ class _Pair:
         tokens = alice.plugin.create_local_datawriter_crypto_tokens(self.writer, self.remote_reader)
         assert bob.plugin.set_remote_datawriter_crypto_tokens(self.reader, self.remote_writer, tokens) is None
 
-    def payload(self, octets: int) -> tuple[Callable[[], bytearray], Callable[[memoryview], object]]:
+    def payload(self, octets: int) -> tuple[Callable[[], Parts | Refused], Callable[[memoryview], object]]:
         plain = os.urandom(octets)
         protect = self.alice.plugin.encode_serialized_payload
         unprotect = self.bob.plugin.decode_serialized_payload
-
-        def encode() -> bytearray:
-            buffer = bytearray()
-            protect(buffer, buffer, plain, self.writer)
-            return buffer
-
+        encode = partial(protect, bytearray(), plain, self.writer)
         return encode, lambda protected: unprotect(protected, b"", self.reader, self.remote_writer)
 
-    def submessage(self, octets: int) -> tuple[Callable[[], bytearray], Callable[[memoryview], object]]:
-        plain = _data(octets)
+    def submessage(self, octets: int) -> tuple[Callable[[], Parts | Refused], Callable[[memoryview], object]]:
+        plain = (_data(octets),)
         protect = self.alice.plugin.encode_datawriter_submessage
         unprotect = self.bob.plugin.decode_datawriter_submessage
         receivers = [self.remote_reader]
-
-        def encode() -> bytearray:
-            buffer = bytearray()
-            protect(buffer, plain, self.writer, receivers)
-            return buffer
-
+        encode = partial(protect, plain, self.writer, receivers)
         return encode, lambda protected: unprotect(protected, self.reader, self.remote_writer)
 
-    def message(self, octets: int) -> tuple[Callable[[], bytearray], Callable[[memoryview], object]]:
-        plain = b"RTPS\2\5\1\x10" + bytes(12) + _data(octets)
+    def message(self, octets: int) -> tuple[Callable[[], Parts | Refused], Callable[[memoryview], object]]:
+        plain = (b"RTPS\2\5\1\x10" + bytes(12), _data(octets))
         protect = self.alice.plugin.encode_rtps_message
         unprotect = self.bob.plugin.decode_rtps_message
         receivers = [self.there]
-
-        def encode() -> bytearray:
-            buffer = bytearray()
-            protect(buffer, plain, self.alice.local, receivers)
-            return buffer
-
+        encode = partial(protect, plain, self.alice.local, receivers)
         return encode, lambda protected: unprotect(protected, self.bob.local, self.here)
 
 
@@ -125,7 +111,9 @@ def transform(level: str, kind: str, octets: int, count: int) -> dict[str, float
     """``encode`` and ``decode`` in multiples of the bare call's time, and the times themselves in microseconds."""
     pair = _Pair(kind)
     encode, decode = {"payload": pair.payload, "submessage": pair.submessage, "message": pair.message}[level](octets)
-    protected = memoryview(bytes(encode()))
+    encoded = encode()
+    assert not isinstance(encoded, Refused), encoded
+    protected = memoryview(b"".join(encoded))
     opened = decode(protected)
     assert not isinstance(opened, Outcome), opened
     aead, nonce, plain = AESGCM(os.urandom(32)), os.urandom(12), os.urandom(octets)

@@ -7,7 +7,7 @@ it shows names and sizes (:mod:`ddsi.trace.generic_message`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from itertools import compress
@@ -111,14 +111,14 @@ class WatchedHooks:
             self._payload_writers.add(writer)
         return protected
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         plain = b"".join(submessage)
         protected = self._hooks.encode_submessage(sender, receivers, submessage)
         if protected:
             self._said.append((b"".join(protected), sender, plain))
         return protected
 
-    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+    def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
         before = b"".join(message)
         protected = self._hooks.encode_message(receivers, message)
         self._before_protection[b"".join(protected)] = before

@@ -11,7 +11,6 @@ Not here: timing, QoS defaults and types of other vendors, and what only their h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -90,7 +89,7 @@ class Quirk:
     def __init__(self, hooks: SecurityHooks) -> None:
         self.hooks = hooks
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         """A submessage before it is protected; None leaves it unsaid."""
         return submessage
 
@@ -98,7 +97,7 @@ class Quirk:
         """Does a message to this endpoint leave without the protection of messages, where there is one?"""
         return False
 
-    def wrap(self, sender: Guid, receivers: Sequence[Guid], envelope: bytes) -> bytes:
+    def wrap(self, sender: Guid, receivers: tuple[Guid, ...], envelope: bytes) -> bytes:
         """What became of it: SEC_PREFIX to SEC_POSTFIX.  Only asked where submessages are protected."""
         return envelope
 
@@ -132,7 +131,7 @@ class Quirk:
 class AckNackFromZero(Quirk):
     """ "What have you?" is an ACKNACK with base 0, where the specification has 1 (RTPS 2.5 §8.3.8.1.3)."""
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if isinstance(submessage, AckNack) and submessage.reader_sn_state == NumberSet(1):
             return replace(submessage, reader_sn_state=NumberSet(0))
         return submessage
@@ -144,7 +143,7 @@ class HeartbeatForAll(Quirk):
     Who is told asks for them, and gets a GAP.
     """
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         writer = self.engine.local_writers.get(sender)
         if not isinstance(submessage, Heartbeat) or writer is None or len(receivers) != 1:
             return submessage
@@ -163,7 +162,7 @@ class GapWhenAsked(Quirk):
         super().__init__(hooks)
         self._kept_back: set[tuple[Guid, tuple[Guid, ...], int]] = set()
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if isinstance(submessage, Gap):
             gap = (sender, tuple(receivers), submessage.gap_start)
             if gap not in self._kept_back:
@@ -175,7 +174,7 @@ class GapWhenAsked(Quirk):
 class DisposeByKeyHash(Quirk):
     """The end of an instance names it by its key hash alone, without a payload (RTPS 2.5 §9.6.4.8)."""
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if not isinstance(submessage, Data) or not submessage.is_key:
             return submessage
         assert submessage.inline_qos is not None
@@ -186,7 +185,7 @@ class DisposeByKeyHash(Quirk):
 class AckNackCountZero(Quirk):
     """ "What have you?" is an ACKNACK with count 0, again and again, where counts ascend (RTPS 2.5 §8.3.8.1.3)."""
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if isinstance(submessage, AckNack) and submessage.reader_sn_state == NumberSet(1) and not submessage.final:
             return replace(submessage, count=0)
         return submessage
@@ -214,7 +213,7 @@ class BigEndianSubmessages(Quirk):
 
     little_endian = False
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if not isinstance(submessage, Data | DataFrag) or submessage.inline_qos is None:
             return submessage
         swapped = type(submessage.inline_qos)(submessage.inline_qos, little_endian=False)
@@ -253,7 +252,7 @@ class OpensAfterJoining(Quirk):
 class NonStandardPayload(Quirk):
     """A payload that is protected is called non-standard (flag N), as it begins with no encapsulation header."""
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if not isinstance(submessage, Data | DataFrag) or not submessage.serialized_payload:
             return submessage
         is_protected = self.hooks.overhead(sender, receivers).payload > 0
@@ -263,7 +262,7 @@ class NonStandardPayload(Quirk):
 class BigEndianEnvelopes(Quirk):
     """The headers of SEC_ and SRTPS_ submessages are big-endian, whatever is in them (RTPS 2.5 §9.4.5.1.2)."""
 
-    def wrap(self, sender: Guid, receivers: Sequence[Guid], envelope: bytes) -> bytes:
+    def wrap(self, sender: Guid, receivers: tuple[Guid, ...], envelope: bytes) -> bytes:
         return _big_endian(envelope, 0, _ENVELOPE)
 
     def finish(self, message: bytes) -> bytes:
@@ -289,14 +288,14 @@ class ProtectedTimestamp(Quirk):
         super().__init__(hooks)
         self._ticks: int | None = None  # of the sample that is being protected
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         self._ticks = None
         if isinstance(submessage, Data | DataFrag):
             change = self.engine.local_writers[sender].behavior.cache.get(submessage.writer_sn)
             self._ticks = change.source_timestamp if change is not None else None
         return submessage
 
-    def wrap(self, sender: Guid, receivers: Sequence[Guid], envelope: bytes) -> bytes:
+    def wrap(self, sender: Guid, receivers: tuple[Guid, ...], envelope: bytes) -> bytes:
         if self._ticks is None:
             return envelope
         info = InfoTimestamp(self._ticks).encode()

@@ -139,7 +139,7 @@ class VendorHooks:
         seals = any(quirk.seals_before_cutting for quirk in self._quirks)
         return seals or self._hooks.opens_after_joining(reader)
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         said = self._said(sender, receivers, b"".join(submessage))
         encoded = b"".join(self._hooks.encode_submessage(sender, receivers, (said,))) if said else b""
         if encoded[:1] == bytes((SubmessageKind.SEC_PREFIX,)):
@@ -149,7 +149,7 @@ class VendorHooks:
                 encoded = wrapped
         return (encoded,) if encoded else ()
 
-    def _said(self, sender: Guid, receivers: Sequence[Guid], octets: bytes) -> bytes:
+    def _said(self, sender: Guid, receivers: tuple[Guid, ...], octets: bytes) -> bytes:
         """What is said instead of this submessage; nothing if it is left unsaid."""
         (raw,) = iterate_submessages(octets, start=0)
         submessage = decode_submessage(raw)
@@ -163,7 +163,7 @@ class VendorHooks:
         assert isinstance(submessage, _EntitySubmessage), f"{submessage} is of no endpoint"
         return submessage.encode(little_endian=all(quirk.little_endian for quirk in self._quirks))
 
-    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+    def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
         assembled = b"".join(message)
         for quirk in self._quirks:
             assembled = quirk.assemble(assembled)

@@ -266,22 +266,26 @@ class SecurityHooks(Protocol):
 
     # --- transform, outwards -----------------------------------------------------------------------------
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         """Octets that protection will add; asked before a message is packed."""
         ...
 
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
-        """Protect a SerializedPayload, or one run of fragments of it (§8.5.1.9.1)."""
+        """Protect a SerializedPayload, or one run of fragments of it (§8.5.1.9.1).
+
+        What is returned goes into a submessage at once, and through :meth:`encode_submessage`: it is not to be kept
+        beyond the next call.
+        """
         ...
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         """Protect one submessage of a writer or reader; returns the octets to send in its place (§8.5.1.9.2-3).
 
         Nothing at all, ``()``, when it must not leave: there is no key for anybody.
         """
         ...
 
-    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+    def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
         """Protect a whole RTPS message, given and returned with its header (§8.5.1.9.4).
 
         ``receivers`` are endpoints or participants; their participants are meant.  ``()``: nothing is to be sent.

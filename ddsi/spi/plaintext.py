@@ -94,16 +94,16 @@ class Plaintext:
     def drain_effects(self) -> Sequence[HookEffect]:
         return ()
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         return NO_OVERHEAD
 
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
         return payload
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         return submessage
 
-    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+    def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
         return message
 
     def decode_message(self, message: Octets, source: bytes) -> Octets | Outcome:

@@ -6,19 +6,19 @@ allocates costs less there than several that do not.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from ddsi.serialization.cursor import Octets
 
-__all__ = ["LARGE", "Scratch", "append_encrypted", "decrypt_joined", "decrypt_sealed"]
+__all__ = ["LARGE", "Scratch", "decrypt_joined", "decrypt_sealed", "decrypter_into", "encrypt_between"]
 
 LARGE: Final = 1 << 14
 """From so many octets on it pays to spare copies: one of 64 KiB takes a fifth of the time that encrypting them does."""
 
 _TAG_LENGTH: Final = 16
-_ZEROS: Final = memoryview(bytes((1 << 16) + 256))
 _HAS_INTO: Final = hasattr(AESGCM, "encrypt_into") and hasattr(AESGCM, "decrypt_into")
 """cryptography has them since version 47."""
 _LARGEST_KEPT: Final = 1 << 16
@@ -26,53 +26,43 @@ _LARGEST_KEPT: Final = 1 << 16
 
 
 class Scratch:
-    """Room for large plain texts, each of which its reader is done with before the next one comes.
+    """Room for large octets, each of which their reader is done with before the next ones come.
 
     The same octets again and again stay in the processor's caches; fresh ones cost as much as decrypting does.
     """
 
-    __slots__ = ("_octets",)
+    __slots__ = ("_last", "_octets")
 
     def __init__(self) -> None:
         self._octets = bytearray()
+        self._last = memoryview(self._octets)
 
     def room(self, length: int) -> memoryview:
         """So many octets, which hold anything."""
+        if len(self._last) == length:  # all fragments but one are of one length
+            return self._last
         if length > _LARGEST_KEPT:
             return memoryview(bytearray(length))
         if len(self._octets) < length:
             self._octets = bytearray(_LARGEST_KEPT)
-        return memoryview(self._octets)[:length]
+        self._last = memoryview(self._octets)[:length]
+        return self._last
 
     def wipe(self) -> None:
         """What was decrypted last is not to be found in memory any more."""
         self._octets[:] = bytes(len(self._octets))
 
 
-def append_encrypted(buffer: bytearray, plain: Octets, aead: AESGCM, nonce: bytes, *, spare: int) -> bytes:
-    """Append the cipher text of ``plain`` to ``buffer`` and return the tag, 16 octets, which may belong elsewhere.
-
-    ``spare``: so many octets more will be appended soon.  A bytearray that has just grown by a lot has no room left,
-    and the next octet moves all of it; so it grows once, by whatever is at hand, which is then overwritten.
-    """
-    if not _HAS_INTO:
-        sealed = aead.encrypt(nonce, plain, None)
-        buffer += memoryview(sealed)[:-_TAG_LENGTH]
-        return sealed[-_TAG_LENGTH:]
-    start = len(buffer)
-    end = start + len(plain)
-    wanted = len(plain) + _TAG_LENGTH + spare
-    if wanted <= len(_ZEROS):
-        buffer += _ZEROS[:wanted]
-    else:
-        buffer += plain
-        buffer += bytes(_TAG_LENGTH + spare)
-    room = memoryview(buffer)[start : end + _TAG_LENGTH]
-    aead.encrypt_into(nonce, plain, None, room)
-    tag = bytes(room[-_TAG_LENGTH:])
-    room.release()  # else the buffer could not change its length
-    del buffer[end:]
-    return tag
+def encrypt_between(head: bytes, plain: Octets, foot: bytes, aead: AESGCM, nonce: bytes, scratch: Scratch) -> Octets:
+    """The cipher text of ``plain`` with its tag, between ``head`` and ``foot``; in ``scratch`` if it is large."""
+    if len(plain) < LARGE or not _HAS_INTO:
+        return b"".join((head, aead.encrypt(nonce, plain, None), foot))
+    start, end = len(head), len(head) + len(plain) + _TAG_LENGTH
+    room = scratch.room(end + len(foot))
+    room[:start] = head
+    aead.encrypt_into(nonce, plain, None, room[start:end])
+    room[end:] = foot
+    return room
 
 
 def decrypt_joined(
@@ -102,3 +92,14 @@ def decrypt_sealed(aead: AESGCM, nonce: bytes, sealed: Octets, scratch: Scratch)
     plain = scratch.room(len(sealed) - _TAG_LENGTH)
     aead.decrypt_into(nonce, sealed, None, plain)
     return plain
+
+
+def decrypter_into(aead: AESGCM) -> Callable[[bytes, Octets, None, memoryview], object]:
+    """``decrypt_into`` of the library, or what does the same: nonce, octets with their tag, nothing, where to."""
+    if _HAS_INTO:
+        return aead.decrypt_into
+
+    def decrypt_into(nonce: bytes, sealed: Octets, associated: None, room: memoryview) -> None:
+        room[:] = aead.decrypt(nonce, sealed, associated)
+
+    return decrypt_into

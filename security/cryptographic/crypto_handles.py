@@ -44,13 +44,25 @@ class LocalParticipant(ParticipantCryptoHandle):
     """``key``: of whole messages; None where they are not protected.  ``protection`` likewise.
 
     ``scratch``: for large plain texts, of messages, submessages and payloads, which lie within each other.
+    ``sending``: for large payloads that a protected submessage takes up as soon as they are protected.
     """
 
-    __slots__ = ("_last_key_id", "endpoints", "key", "key_bits", "max_blocks", "protection", "remotes", "scratch")
+    __slots__ = (
+        "_last_key_id",
+        "endpoints",
+        "key",
+        "key_bits",
+        "max_blocks",
+        "protection",
+        "remotes",
+        "scratch",
+        "sending",
+    )
 
     def __init__(self, protection: Protection | None, *, key_bits: int, max_blocks: int, first_key_id: int) -> None:
         self.protection = protection
         self.scratch = (Scratch(), Scratch(), Scratch())
+        self.sending = Scratch()
         self.key_bits = key_bits
         self.max_blocks = max_blocks
         self.key: SendingKey | None = None

@@ -20,15 +20,16 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from ddsi.spi import Octets, Outcome
 
-from .aes_gcm import LARGE, Scratch, decrypt_sealed
+from .aes_gcm import LARGE, Scratch, decrypter_into
 from .envelope import ENVELOPE_KINDS, HEAD, MESSAGE, SUBMESSAGE, Envelope, body_head
-from .opening import as_message
+from .opening import INFO_SRC_HEADS, as_message, with_header
 from .received_keys import KeyRing, ReceivedSession
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
 
 __all__ = [
     "MessageOpener",
     "PayloadOpener",
+    "SignedMessageOpener",
     "SubmessageOpener",
     "message_opener",
     "payload_opener",
@@ -42,10 +43,16 @@ _CONTENT_AT: Final = 32
 _FOOT: Final = 24
 """The postfix with its header, without receiver-specific MACs."""
 _NO_MACS: Final = bytes(4)
-_LEAST: Final = _CONTENT_AT + 4 + _FOOT
-"""Octets around the content of an encrypted submessage, and its header."""
+_POSTFIX_HEAD: Final = MESSAGE.postfix_head
+_SIGNED_AT: Final = _RTPS_HEADER + _BODY_AT
+_LEAST_SIGNED: Final = _SIGNED_AT + 24 + _FOOT
+"""A signed message with INFO_SRC alone."""
+_AROUND: Final = _CONTENT_AT + _FOOT
+"""Octets around what is encrypted."""
+_LEAST: Final = _AROUND + 4
 
-_PAYLOAD_NONCE_AT: Final = 8
+_PAYLOAD_HEAD: Final = struct.Struct(">8x12sI")
+"""The nonce, and how many octets were encrypted."""
 _PAYLOAD_CONTENT_AT: Final = HEADER_LENGTH + 4
 _PAYLOAD_FOOT: Final = MAC_LENGTH + len(_NO_MACS)
 
@@ -53,13 +60,13 @@ _PAYLOAD_FOOT: Final = MAC_LENGTH + len(_NO_MACS)
 class _Encrypted:
     """Envelopes that begin with the same 16 octets: encrypted, for all receivers alike, in one session."""
 
-    __slots__ = ("_aead", "_decrypt", "_postfix_head", "_scratch")
+    __slots__ = ("_decrypt", "_decrypt_into", "_postfix_head", "_room")
 
     def __init__(self, envelope: Envelope, aead: AESGCM, scratch: Scratch) -> None:
         self._postfix_head = envelope.postfix_head
-        self._aead = aead
         self._decrypt = aead.decrypt
-        self._scratch = scratch
+        self._decrypt_into = decrypter_into(aead)
+        self._room = scratch.room
 
     def content(self, octets: Octets) -> Octets | None:
         """What lies in the envelope; else None, and the octets are as they were.
@@ -83,11 +90,11 @@ class _Encrypted:
     def _large_content(self, octets: memoryview) -> Octets | None:
         """Without copying, where ``octets`` can be written to: the MAC goes for a while to where AES-GCM wants it."""
         length = len(octets)
-        foot = bytes(octets[-_FOOT:])
-        mac = foot[4 : 4 + MAC_LENGTH]
-        if length < _LEAST or length & 3 or foot != self._postfix_head + mac + _NO_MACS:
+        if length < _LEAST:
             return None
-        if octets[_BODY_AT:_CONTENT_AT] != body_head(length - _CONTENT_AT - _FOOT):
+        take_apart, expected_head = _large_layout(length)
+        nonce, head, postfix_head, mac, count = take_apart(octets)
+        if head != expected_head or postfix_head != self._postfix_head or count != _NO_MACS:
             return None
         if octets.readonly:
             sealed: Octets = b"".join((octets[_CONTENT_AT:-_FOOT], mac))
@@ -95,12 +102,13 @@ class _Encrypted:
             octets[-_FOOT : MAC_LENGTH - _FOOT] = mac
             sealed = octets[_CONTENT_AT : MAC_LENGTH - _FOOT]
         try:
-            return decrypt_sealed(self._aead, bytes(octets[_NONCE_AT:_BODY_AT]), sealed, self._scratch)
+            room = self._room(length - _AROUND)
+            self._decrypt_into(nonce, sealed, None, room)
+            return room
         except InvalidTag:
-            return None
-        finally:
             if not octets.readonly:
-                octets[-_FOOT:] = foot
+                octets[-_FOOT:] = b"".join((postfix_head, mac, count))
+            return None
 
 
 # Few lengths are in use at a time, and one call that takes all apart is quicker than a slice for each.
@@ -112,22 +120,12 @@ def _layout(length: int) -> tuple[Callable[[bytes], tuple[bytes, ...]], bytes]:
     return parts.unpack, b"" if length & 3 else body_head(content)
 
 
-class _Signed:
-    """The same of envelopes that are signed."""
-
-    __slots__ = ("_encrypt", "_postfix_head")
-
-    def __init__(self, envelope: Envelope, aead: AESGCM) -> None:
-        self._postfix_head = envelope.postfix_head
-        self._encrypt = aead.encrypt
-
-    def content(self, octets: Octets) -> Octets | None:
-        """As :meth:`_Encrypted.content`; a part of ``octets``, which are not copied where they are a view."""
-        content, foot = octets[_BODY_AT:-_FOOT], octets[-_FOOT:]
-        if not len(content) or foot[:4] != self._postfix_head or foot[-4:] != _NO_MACS:
-            return None
-        mac = self._encrypt(bytes(octets[_NONCE_AT:_BODY_AT]), b"", content)
-        return content if compare_digest(mac, foot[4:-4]) else None
+@lru_cache(maxsize=256)
+def _large_layout(length: int) -> tuple[Callable[[Octets], tuple[bytes, ...]], bytes]:
+    """The same without the content, which stays where it is."""
+    content = length - _CONTENT_AT - _FOOT
+    parts = struct.Struct(f"{_NONCE_AT}x12s8s{content}x4s{MAC_LENGTH}s4s")
+    return parts.unpack, b"" if length & 3 else body_head(content)
 
 
 class SubmessageOpener(_Encrypted):
@@ -147,12 +145,12 @@ class SubmessageOpener(_Encrypted):
 
 
 class MessageOpener:
-    """For messages that follow their header with the same 16 octets, and end with SRTPS_POSTFIX."""
+    """For messages that follow their header with the same 16 octets, and end with SRTPS_POSTFIX: encrypted ones."""
 
     __slots__ = ("_content",)
 
-    def __init__(self, envelopes: _Encrypted | _Signed) -> None:
-        self._content = envelopes.content
+    def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
+        self._content = _Encrypted(MESSAGE, aead, scratch).content
 
     def open(self, octets: Octets) -> Octets | None:
         """The message, with its header; else None, and ``octets`` are as they were."""
@@ -165,32 +163,69 @@ class MessageOpener:
         return None if isinstance(message, Outcome) else message
 
 
+class SignedMessageOpener:
+    """The same of messages that are signed."""
+
+    __slots__ = ("_encrypt",)
+
+    def __init__(self, aead: AESGCM) -> None:
+        self._encrypt = aead.encrypt
+
+    def open(self, octets: Octets) -> Octets | None:
+        """As :meth:`MessageOpener.open`.  Large octets that can be written to are not copied."""
+        length = len(octets)
+        if length < _LEAST_SIGNED:
+            return None
+        take_apart = _signed_layout(length)
+        source, nonce, head, info_source, postfix_head, mac, count = take_apart(octets)
+        if info_source != source or head not in INFO_SRC_HEADS or postfix_head != _POSTFIX_HEAD or count != _NO_MACS:
+            return None
+        signed = octets[_SIGNED_AT:-_FOOT]
+        if not compare_digest(self._encrypt(nonce, b"", signed), mac):
+            return None
+        return with_header(signed)
+
+
+# As :func:`_layout`.
+@lru_cache(maxsize=256)
+def _signed_layout(length: int) -> Callable[[Octets], tuple[bytes, ...]]:
+    """Of a signed message with so many octets: its source, the nonce, of INFO_SRC the head and the source, its foot."""
+    return struct.Struct(f"8x12s12x12s4s8x12s{length - _LEAST_SIGNED}x4s{MAC_LENGTH}s4s").unpack
+
+
 class PayloadOpener:
     """For payloads that begin with the same 12 octets: encrypted, in one session."""
 
-    __slots__ = ("_aead", "_decrypt", "_scratch")
+    __slots__ = ("_decrypt", "_decrypt_into", "_room")
 
     def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
-        self._aead = aead
         self._decrypt = aead.decrypt
-        self._scratch = scratch
+        self._decrypt_into = decrypter_into(aead)
+        self._room = scratch.room
 
     def open(self, octets: Octets) -> Octets | None:
         """The payload in ``octets``, behind which is no padding; else None, also where they were altered."""
         length = len(octets)
-        content = int.from_bytes(octets[HEADER_LENGTH:_PAYLOAD_CONTENT_AT], "big")
-        if content != length - _PAYLOAD_CONTENT_AT - _PAYLOAD_FOOT or octets[-4:] != _NO_MACS:
+        content = length - _PAYLOAD_CONTENT_AT - _PAYLOAD_FOOT
+        if content < 0:
             return None
-        nonce, sealed = octets[_PAYLOAD_NONCE_AT:HEADER_LENGTH], octets[_PAYLOAD_CONTENT_AT:-4]
+        nonce, stated = _PAYLOAD_HEAD.unpack_from(octets)
+        if stated != content or octets[-4:] != _NO_MACS:
+            return None
+        sealed = octets[_PAYLOAD_CONTENT_AT:-4]
         try:
             if length < LARGE:
                 return self._decrypt(nonce, sealed, None)
-            return decrypt_sealed(self._aead, bytes(nonce), sealed, self._scratch)
+            room = self._room(content)
+            self._decrypt_into(nonce, sealed, None, room)
+            return room
         except InvalidTag:
             return None
 
 
-def message_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> MessageOpener | None:
+def message_opener(
+    octets: Octets, ring: KeyRing, expected: Protection | None
+) -> MessageOpener | SignedMessageOpener | None:
     """Opens what begins as ``octets``, which were opened with this ring; None where the usual form is not expected.
 
     It holds until the ring changes.
@@ -200,8 +235,8 @@ def message_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -
     if session is None or expected is None or octets[_RTPS_HEADER:at] != MESSAGE.prefix_head:
         return None
     if expected.encrypted:
-        return MessageOpener(_Encrypted(MESSAGE, session.aead, ring.scratch))
-    return MessageOpener(_Signed(MESSAGE, session.aead))
+        return MessageOpener(session.aead, ring.scratch)
+    return SignedMessageOpener(session.aead)
 
 
 def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> SubmessageOpener | None:

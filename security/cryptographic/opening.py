@@ -31,10 +31,10 @@ from .envelope import (
 from .received_keys import KeyRing
 from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, MAC_LENGTH, Protection
 
-__all__ = ["as_message", "open_message", "open_submessage"]
+__all__ = ["INFO_SRC_HEADS", "as_message", "open_message", "open_submessage"]
 
 _RTPS: Final = b"RTPS"
-_INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
+INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
 _ENDS_TOO_SOON: Final = "the octets end within the envelope"
 
 _Plain = bytes | bytearray | memoryview
@@ -76,11 +76,19 @@ def open_message(octets: Octets, ring: KeyRing, expected: Protection | None) -> 
 
 def as_message(plain: Octets, octets: Octets) -> Octets | Outcome:
     """The message of which ``plain`` was protected; it came in ``octets``, and both name the same participant."""
-    if plain[:4] not in _INFO_SRC_HEADS or len(plain) < 24:
+    info_source = bytes(plain[:24])
+    if info_source[:4] not in INFO_SRC_HEADS or len(info_source) < 24:
         return Rejected("there is no INFO_SRC at the head of what was protected")
-    if plain[12:24] != octets[8:HEADER_LENGTH]:
+    if info_source[12:] != octets[8:HEADER_LENGTH]:
         return Rejected("INFO_SRC names another participant than the header")
-    # INFO_SRC is laid out as a message's header, with `unused` where that has "RTPS".
+    return with_header(plain)
+
+
+def with_header(plain: Octets) -> Octets:
+    """The message of what begins with INFO_SRC, which is laid out as a header, with `unused` where that has "RTPS".
+
+    What is large and can be written to is not copied.
+    """
     whole = memoryview(plain)
     if whole.readonly:
         return _RTPS + whole[8:]

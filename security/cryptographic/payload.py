@@ -17,10 +17,10 @@ from typing import Final
 
 from cryptography.exceptions import InvalidTag
 
-from ddsi.spi import Octets, Outcome, Refused, Rejected
+from ddsi.spi import Octets, Outcome, Parts, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
-from .aes_gcm import LARGE, Scratch, append_encrypted, decrypt_sealed
+from .aes_gcm import LARGE, Scratch, decrypt_sealed, encrypt_between
 from .received_keys import KeyRing, ReceivedKey
 from .session_keys import NONCE_AT, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
@@ -42,8 +42,8 @@ def overhead(protection: Protection | None) -> int:
     return (_CONTENT_AT if protection.encrypted else HEADER_LENGTH) + _LONGEST_PADDING + _FOOTER_LENGTH
 
 
-def encode_payload(buffer: bytearray, plain: Octets, key: SendingKey) -> Refused | None:
-    """Append the protected form of ``plain`` to ``buffer``."""
+def encode_payload(plain: Octets, key: SendingKey, scratch: Scratch | None = None) -> Parts | Refused:
+    """The protected form of ``plain``, which may lie in ``scratch``."""
     if len(plain) & 3:
         plain = bytes(plain) + bytes(-len(plain) & 3)
     length = len(plain)
@@ -51,19 +51,12 @@ def encode_payload(buffer: bytearray, plain: Octets, key: SendingKey) -> Refused
     if header is None:
         return USED_UP
     nonce = header[NONCE_AT:]
-    if not key.encrypts:
-        mac = key.aead.encrypt(nonce, b"", plain)
-        buffer += header
-        buffer += plain
-        buffer += mac + _NO_MACS
-    elif length < LARGE:
-        sealed = key.aead.encrypt(nonce, plain, None)
-        buffer += b"".join((header, length.to_bytes(4, "big"), sealed, _NO_MACS))
-    else:
-        buffer += header + length.to_bytes(4, "big")
-        tag = append_encrypted(buffer, plain, key.aead, nonce, spare=_FOOTER_LENGTH)
-        buffer += tag + _NO_MACS
-    return None
+    if key.encrypts:
+        head = header + length.to_bytes(4, "big")
+        if scratch is not None:
+            return (encrypt_between(head, plain, _NO_MACS, key.aead, nonce, scratch),)
+        return head, key.aead.encrypt(nonce, plain, None), _NO_MACS
+    return header, plain, key.aead.encrypt(nonce, b"", plain) + _NO_MACS
 
 
 def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -> Octets | Outcome:

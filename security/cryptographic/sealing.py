@@ -10,9 +10,8 @@ from functools import lru_cache
 from typing import Final
 
 from ddsi.messages.raw_submessage import SubmessageKind
-from ddsi.spi import Octets, Refused
+from ddsi.spi import Octets, Parts, Refused
 
-from .aes_gcm import LARGE, append_encrypted
 from .envelope import FOOTER_LENGTH, HEAD, LONGEST_BODY, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, body_head
 from .payload import USED_UP
 from .session_keys import NONCE_AT, ReceiverKey, SendingKey
@@ -28,36 +27,26 @@ _INFO_SRC_HEAD: Final = HEAD.pack(SubmessageKind.INFO_SRC, 1, 20) + bytes(4)
 """With the field ``unused``.  Version, vendor and prefix, which follow, lie together in the message's header too."""
 
 
-def seal_submessage(
-    buffer: bytearray, submessage: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
-) -> Refused | None:
-    """Append a submessage, protected.  Its length must be filled in: it is no longer the last of a message."""
-    return _seal(SUBMESSAGE, buffer, b"", submessage, key, receivers)
+def seal_submessage(submessage: Parts, key: SendingKey, receivers: Sequence[ReceiverKey]) -> Parts | Refused:
+    """A submessage, protected.  Its length must be filled in: it is no longer the last of a message."""
+    return _seal(SUBMESSAGE, b"", submessage, key, receivers)
 
 
-def seal_message(
-    buffer: bytearray, message: Octets, key: SendingKey, receivers: Sequence[ReceiverKey]
-) -> Refused | None:
-    """Append a message: its header, and protected an INFO_SRC that repeats the header, and all its submessages."""
-    start = len(buffer)
-    buffer += message[:HEADER_LENGTH]
-    rest = message[4:] if len(message) < LARGE else memoryview(message)[4:]
-    refused = _seal(MESSAGE, buffer, _INFO_SRC_HEAD, rest, key, receivers)
-    if refused is not None:
-        del buffer[start:]
-    return refused
+def seal_message(message: Parts, key: SendingKey, receivers: Sequence[ReceiverKey]) -> Parts | Refused:
+    """A message: its header, and protected an INFO_SRC that repeats the header, and all its submessages."""
+    first = message[0]
+    if len(first) < HEADER_LENGTH:
+        message = (first := b"".join(message),)
+    parts = (_INFO_SRC_HEAD, memoryview(first)[4:], *message[1:])
+    return _seal(MESSAGE, bytes(first[:HEADER_LENGTH]), parts, key, receivers)
 
 
 def _seal(
-    envelope: Envelope,
-    buffer: bytearray,
-    head: bytes,
-    body: Octets,
-    key: SendingKey,
-    receivers: Sequence[ReceiverKey],
-) -> Refused | None:
-    """Append ``head`` and ``body``, protected as one."""
-    length = len(head) + len(body)
+    envelope: Envelope, head: bytes, parts: Parts, key: SendingKey, receivers: Sequence[ReceiverKey]
+) -> Parts | Refused:
+    """``parts``, protected as one, behind ``head``, which is in clear."""
+    body = parts[0] if len(parts) == 1 else b"".join(parts)
+    length = len(body)
     if key.encrypts:
         if length > LONGEST_BODY - 4:
             return Refused(f"{length} octets do not fit into one SEC_BODY")
@@ -69,29 +58,21 @@ def _seal(
     if header is None:
         return USED_UP
     nonce = header[NONCE_AT:]
-    if not key.encrypts:
-        buffer += envelope.prefix_head + header + head
-        buffer += body
-        with memoryview(buffer) as view, view[-length:] as signed:
-            mac = key.aead.encrypt(nonce, b"", signed)
-    elif length < LARGE:
-        sealed = key.aead.encrypt(nonce, head + body if head else body, None)
-        mac = sealed[-MAC_LENGTH:]
-        buffer += b"".join((envelope.prefix_head, header, body_head(length), sealed[:-MAC_LENGTH]))
+    padding = b""
+    content: Octets
+    if key.encrypts:
+        sealed = key.aead.encrypt(nonce, body, None)
+        header += body_head(length)
+        content, mac, padding = memoryview(sealed)[:-MAC_LENGTH], sealed[-MAC_LENGTH:], _PADDING[length & 3]
     else:
-        buffer += envelope.prefix_head + header + body_head(length)
-        spare = FOOTER_LENGTH + RECEIVER_MAC_LENGTH * len(receivers) + 8
-        plain = b"".join((head, body)) if head else body
-        mac = append_encrypted(buffer, plain, key.aead, nonce, spare=spare)
+        content, mac = body, key.aead.encrypt(nonce, b"", body)
     if not receivers:
-        buffer += _PADDING[length & 3] + envelope.postfix_head + mac + _NO_MACS
-        return None
-    postfix_head, count = _postfix_head(envelope, len(receivers))
-    parts = [_PADDING[length & 3], postfix_head, mac, count]
-    for receiver in receivers:
-        parts += receiver.key_id, receiver.mac(key, nonce, mac)
-    buffer += b"".join(parts)
-    return None
+        foot = padding + envelope.postfix_head + mac + _NO_MACS
+    else:
+        postfix_head, count = _postfix_head(envelope, len(receivers))
+        macs = [part for receiver in receivers for part in (receiver.key_id, receiver.mac(key, nonce, mac))]
+        foot = b"".join((padding, postfix_head, mac, count, *macs))
+    return head + envelope.prefix_head + header, content, foot
 
 
 @lru_cache(maxsize=256)

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Final, cast
 
-from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Refused, Rejected
+from ddsi.spi import NoKeys, Octets, Outcome, Overhead, Parts, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
@@ -54,55 +54,47 @@ class AesGcmGmacTransform:
 
     def encode_serialized_payload(
         self,
-        encoded_buffer: bytearray,
         extra_inline_qos: bytearray,
         plain_buffer: Octets,
         sending_datawriter_crypto: DatawriterCryptoHandle,
-    ) -> Refused | None:
-        """§8.5.1.9.1.  Padded to a multiple of 4 where it is none; no inline QoS is added."""
+    ) -> Parts | Refused:
+        """§8.5.1.9.1.  Padded to a multiple of 4 where it is none; no inline QoS is added.
+
+        Where submessages are protected too, the payload goes into one of them at once, and need not be kept.
+        """
         assert isinstance(sending_datawriter_crypto, LocalWriter)
-        key = sending_datawriter_crypto.payload_key
-        return NO_KEY if key is None else payload.encode_payload(encoded_buffer, plain_buffer, key)
+        writer = sending_datawriter_crypto
+        if writer.payload_key is None:
+            return NO_KEY
+        scratch = writer.participant.sending if writer.submessage is not None else None
+        return payload.encode_payload(plain_buffer, writer.payload_key, scratch)
 
     def encode_datawriter_submessage(
         self,
-        encoded_rtps_submessage: bytearray,
-        plain_rtps_submessage: Octets,
+        plain_rtps_submessage: Parts,
         sending_datawriter_crypto: DatawriterCryptoHandle,
         receiving_datareader_crypto_list: Sequence[DatareaderCryptoHandle],
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.2.  Of the volatile writer: for one reader, as each has a key of its own."""
         assert isinstance(sending_datawriter_crypto, LocalWriter)
-        return _encode_submessage(
-            encoded_rtps_submessage,
-            plain_rtps_submessage,
-            sending_datawriter_crypto,
-            receiving_datareader_crypto_list,
-        )
+        return _encode_submessage(plain_rtps_submessage, sending_datawriter_crypto, receiving_datareader_crypto_list)
 
     def encode_datareader_submessage(
         self,
-        encoded_rtps_submessage: bytearray,
-        plain_rtps_submessage: Octets,
+        plain_rtps_submessage: Parts,
         sending_datareader_crypto: DatareaderCryptoHandle,
         receiving_datawriter_crypto_list: Sequence[DatawriterCryptoHandle],
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.3.  Of the volatile reader: for one writer, as each has a key of its own."""
         assert isinstance(sending_datareader_crypto, LocalReader)
-        return _encode_submessage(
-            encoded_rtps_submessage,
-            plain_rtps_submessage,
-            sending_datareader_crypto,
-            receiving_datawriter_crypto_list,
-        )
+        return _encode_submessage(plain_rtps_submessage, sending_datareader_crypto, receiving_datawriter_crypto_list)
 
     def encode_rtps_message(
         self,
-        encoded_rtps_message: bytearray,
-        plain_rtps_message: Octets,
+        plain_rtps_message: Parts,
         sending_participant_crypto: ParticipantCryptoHandle,
         receiving_participant_crypto_list: Sequence[ParticipantCryptoHandle],
-    ) -> Refused | None:
+    ) -> Parts | Refused:
         """§8.5.1.9.4."""
         assert isinstance(sending_participant_crypto, LocalParticipant)
         key, protection = sending_participant_crypto.key, sending_participant_crypto.protection
@@ -113,7 +105,7 @@ class AesGcmGmacTransform:
             receivers = _receiver_keys(receiving_participant_crypto_list)
             if not receivers:
                 return _NO_RECEIVER
-        return sealing.seal_message(encoded_rtps_message, plain_rtps_message, key, receivers)
+        return sealing.seal_message(plain_rtps_message, key, receivers)
 
     # --- inwards ---------------------------------------------------------------------------------------------
 
@@ -225,10 +217,10 @@ class AesGcmGmacTransform:
 
 
 def _encode_submessage(
-    buffer: bytearray, submessage: Octets, sender: LocalWriter | LocalReader, receivers: Sequence[object]
-) -> Refused | None:
+    submessage: Parts, sender: LocalWriter | LocalReader, receivers: Sequence[object]
+) -> Parts | Refused:
     if sender.is_volatile:
-        return _encode_volatile(buffer, submessage, receivers)
+        return _encode_volatile(submessage, receivers)
     key, protection = sender.submessage_key, sender.submessage
     if key is None or protection is None:
         return NO_KEY
@@ -237,16 +229,16 @@ def _encode_submessage(
         receiver_keys = _receiver_keys(receivers)
         if not receiver_keys:
             return _NO_RECEIVER
-    return sealing.seal_submessage(buffer, submessage, key, receiver_keys)
+    return sealing.seal_submessage(submessage, key, receiver_keys)
 
 
-def _encode_volatile(buffer: bytearray, submessage: Octets, receivers: Sequence[object]) -> Refused | None:
+def _encode_volatile(submessage: Parts, receivers: Sequence[object]) -> Parts | Refused:
     if len(receivers) != 1:
         return Refused(f"a volatile submessage is for one receiver, not for {len(receivers)}")
     receiver = receivers[0]
     assert isinstance(receiver, RemoteReader | RemoteWriter)
     key: SendingKey | None = receiver.participant.exchange_key
-    return NO_KEY if key is None else sealing.seal_submessage(buffer, submessage, key, ())
+    return NO_KEY if key is None else sealing.seal_submessage(submessage, key, ())
 
 
 def _receiver_keys(receivers: Sequence[object]) -> list[ReceiverKey]:

@@ -5,7 +5,6 @@ DDS 1.4 §2.2.2.3.3; RTPS 2.5 §8.7.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import pytest
@@ -202,7 +201,7 @@ async def test_a_writer_that_does_not_know_a_member_sends_everything(domain: int
 class Protecting(Plaintext):
     """Says that payloads are protected."""
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         return Overhead(payload=44)
 
 

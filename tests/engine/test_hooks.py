@@ -134,7 +134,7 @@ def test_the_moments_of_a_life_are_asked_in_order() -> None:
 
 def test_the_end_is_told_once_behind_the_last_message_and_nothing_is_asked_after_it() -> None:
     class Counting(Hooks):
-        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
             self.asked.append("encode_message")
             return super().encode_message(receivers, message)
 
@@ -392,7 +392,7 @@ class Masking(Hooks):
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
         return payload if writer.entity_id.is_builtin else _inverted(payload)
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         if sender.entity_id.is_builtin:
             return submessage
         body = b"".join(submessage)
@@ -402,7 +402,7 @@ class Masking(Hooks):
     def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         return bytes(protected[12:-8])
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         return Overhead(submessage=20)
 
     def admits(self, sender: bytes, protection: int) -> bool:
@@ -441,7 +441,7 @@ def test_protected_samples_and_fragments_arrive_and_messages_keep_their_size() -
 
 def test_what_comes_in_clear_but_should_not_is_dropped_and_counted() -> None:
     class Lax(Masking):
-        def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+        def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
             return submessage
 
     domain = Domain()
@@ -485,7 +485,7 @@ def test_what_does_not_decode_is_dropped_with_its_outcome(outcome: Outcome, reas
 
 def test_a_whole_message_that_does_not_decode_is_dropped() -> None:
     class Wrapping(Hooks):
-        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
             octets = b"".join(message)
             return (octets[:20], b"\x33\x01\x04\0wrap", octets[20:])
 
@@ -517,7 +517,7 @@ def test_what_must_not_leave_is_not_sent_in_any_form() -> None:
     class Silent(Masking):
         is_silent = False
 
-        def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+        def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
             if self.is_silent and not sender.entity_id.is_builtin:
                 return ()
             return super().encode_submessage(sender, receivers, submessage)
@@ -543,7 +543,7 @@ def test_a_message_that_must_not_leave_is_not_sent() -> None:
     class Mute(Hooks):
         is_mute = False
 
-        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
             return () if self.is_mute else message
 
     domain, a, b = secured(Mute)
@@ -565,10 +565,10 @@ def test_messages_and_fragments_leave_room_for_what_each_receiver_adds(receivers
     """DDS-Security 1.1 §8.5.1.9: with origin authentication each receiver has a MAC of 20 octets, at both levels."""
 
     class Costly(Masking):
-        def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
             return Overhead(submessage=20 + 20 * len(receivers), message=28 + 20 * len(receivers))
 
-        def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+        def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
             parts = super().encode_submessage(sender, receivers, submessage)
             if sender.entity_id.is_builtin:
                 return parts
@@ -579,7 +579,7 @@ def test_messages_and_fragments_leave_room_for_what_each_receiver_adds(receivers
             size = int.from_bytes(protected[10:12], "little")
             return bytes(protected[12 : 12 + size])
 
-        def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+        def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
             return (
                 *message,
                 b"\x34\x01" + (24 + 20 * len(receivers)).to_bytes(2, "little"),
@@ -613,7 +613,7 @@ def test_fragments_of_one_sample_keep_their_size_when_receivers_come() -> None:
     """A reader that has some of them could not join them with others."""
 
     class Growing(Hooks):
-        def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
             return Overhead(message=200 * len(receivers))
 
     domain, a, b = secured(Growing)
@@ -646,7 +646,7 @@ class Sealing(Masking):
     def protects_payload(self, writer: Guid) -> bool:
         return not writer.entity_id.is_builtin
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         return Overhead(payload=40, submessage=20)
 
 

@@ -237,7 +237,7 @@ class XorSecurity(Plaintext):
 
     # --- transform ---------------------------------------------------------------------------------------
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         return Overhead(submessage=44, message=44)
 
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
@@ -246,7 +246,7 @@ class XorSecurity(Plaintext):
     def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
         return payload if writer.entity_id.is_builtin else _xor(payload, 0x5A)
 
-    def encode_submessage(self, sender: Guid, receivers: Sequence[Guid], submessage: Parts) -> Parts:
+    def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         entity = sender.entity_id
         if entity in (*STATELESS, *PLAIN):
             return submessage
@@ -264,7 +264,7 @@ class XorSecurity(Plaintext):
         plain = _open(protected, key)
         return NOT_FOR_US if is_kx and isinstance(plain, Rejected) else plain
 
-    def encode_message(self, receivers: Sequence[Guid], message: Parts) -> Parts:
+    def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
         if receivers[0].entity_id in (*STATELESS, *VOLATILE):
             return message
         octets = b"".join(message)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import pytest
 
 from ddsi.config import Config
@@ -41,7 +39,7 @@ READER = Guid.of(GuidPrefix(b"\1\xdd" + bytes(10)), READER_ID)
 class Protecting(Plaintext):
     """Hooks that say that they protect payloads."""
 
-    def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+    def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
         return Overhead(payload=44)
 
 
@@ -301,7 +299,7 @@ def test_runs_that_cannot_be_opened_are_not_heard_and_count_as_never_come() -> N
         def encode_payload(self, writer: Guid, payload: bytes | bytearray | memoryview) -> bytes:
             return bytes(payload) + bytes(44)
 
-        def overhead(self, sender: Guid, receivers: Sequence[Guid]) -> Overhead:
+        def overhead(self, sender: Guid, receivers: tuple[Guid, ...]) -> Overhead:
             return Overhead(payload=44)
 
     careless, opendds = domain.node(make_hooks=Longer), domain.node(vendor=OPENDDS)

@@ -32,6 +32,7 @@ from tests.security.captured.straight import (
     submessages,
 )
 from tests.security.cryptographic import vectors as v
+from tests.security.cryptographic.keys import octets_of
 
 KINDS = ["SIGN", "ENCRYPT", "SIGN_WITH_ORIGIN_AUTHENTICATION", "ENCRYPT_WITH_ORIGIN_AUTHENTICATION"]
 BITS = ["128", "256"]
@@ -100,8 +101,7 @@ def test_messages(kind: str, bits: str) -> None:
     materials = [material_of(token) for (token,) in tokens]
     assert {key_length(material.kind) * 8 for material in materials} == {int(bits)}
     message = v.MESSAGE_HEADER + HEARTBEAT * 3
-    encoded = bytearray()
-    assert sender.plugin.encode_rtps_message(encoded, message, sender.local, sender.remotes) is None
+    encoded = octets_of(sender.plugin.encode_rtps_message((message,), sender.local, sender.remotes))
     assert encoded[:20] == message[:20]
     plain = opened(bytes(encoded[20:]), materials, (SRTPS_PREFIX, SRTPS_POSTFIX), kind)
     assert plain == v.INFO_SOURCE + message[20:]
@@ -114,14 +114,12 @@ def test_submessages_of_writers_and_readers(kind: str, bits: str) -> None:
     plugin = sender.plugin
     of_writer = [plugin.create_local_datawriter_crypto_tokens(sender.writer, to)[0] for to in sender.remote_readers]
     of_reader = [plugin.create_local_datareader_crypto_tokens(sender.reader, to)[0] for to in sender.remote_writers]
-    encoded = bytearray()
-    assert plugin.encode_datawriter_submessage(encoded, HEARTBEAT, sender.writer, sender.remote_readers) is None
+    encoded = octets_of(plugin.encode_datawriter_submessage((HEARTBEAT,), sender.writer, sender.remote_readers))
     materials = [material_of(token) for token in of_writer]
-    assert opened(bytes(encoded), materials, (SEC_PREFIX, SEC_POSTFIX), kind) == HEARTBEAT
-    encoded = bytearray()
-    assert plugin.encode_datareader_submessage(encoded, ACKNACK, sender.reader, sender.remote_writers) is None
+    assert opened(encoded, materials, (SEC_PREFIX, SEC_POSTFIX), kind) == HEARTBEAT
+    encoded = octets_of(plugin.encode_datareader_submessage((ACKNACK,), sender.reader, sender.remote_writers))
     materials = [material_of(token) for token in of_reader]
-    assert opened(bytes(encoded), materials, (SEC_PREFIX, SEC_POSTFIX), kind) == ACKNACK
+    assert opened(encoded, materials, (SEC_PREFIX, SEC_POSTFIX), kind) == ACKNACK
 
 
 @pytest.mark.parametrize("bits", BITS)
@@ -132,9 +130,8 @@ def test_payloads(kind: str, bits: str, plain: bytes) -> None:
     """Padded to a multiple of 4, which the encapsulation header could have asked for as well."""
     sender = Sender(kind, bits)
     *_, token = sender.plugin.create_local_datawriter_crypto_tokens(sender.writer, sender.remote_readers[0])
-    encoded = bytearray()
-    assert sender.plugin.encode_serialized_payload(encoded, bytearray(), plain, sender.writer) is None
-    assert open_payload(bytes(encoded), material_of(token)) == plain + bytes(-len(plain) % 4)
+    encoded = octets_of(sender.plugin.encode_serialized_payload(bytearray(), plain, sender.writer))
+    assert open_payload(encoded, material_of(token)) == plain + bytes(-len(plain) % 4)
 
 
 def test_large_payloads() -> None:
@@ -142,9 +139,9 @@ def test_large_payloads() -> None:
     sender = Sender("ENCRYPT", "256")
     *_, token = sender.plugin.create_local_datawriter_crypto_tokens(sender.writer, sender.remote_readers[0])
     for length in (16_380, 16_384, 16_388, 65_536):
-        plain, encoded = Random(length).randbytes(length), bytearray()
-        assert sender.plugin.encode_serialized_payload(encoded, bytearray(), plain, sender.writer) is None
-        assert open_payload(bytes(encoded), material_of(token)) == plain
+        plain = Random(length).randbytes(length)
+        encoded = octets_of(sender.plugin.encode_serialized_payload(bytearray(), plain, sender.writer))
+        assert open_payload(encoded, material_of(token)) == plain
 
 
 def test_the_volatile_topic() -> None:
@@ -160,12 +157,10 @@ def test_the_volatile_topic() -> None:
     material = kx_material(v.CHALLENGE1, v.CHALLENGE2, bytes(range(32)))
     nonces = set()
     for _ in range(20):
-        encoded = bytearray()
-        assert plugin.encode_datawriter_submessage(encoded, HEARTBEAT, writer, [remote_reader]) is None
-        assert opened(bytes(encoded), [material], (SEC_PREFIX, SEC_POSTFIX), "ENCRYPT") == HEARTBEAT
+        encoded = octets_of(plugin.encode_datawriter_submessage((HEARTBEAT,), writer, [remote_reader]))
+        assert opened(encoded, [material], (SEC_PREFIX, SEC_POSTFIX), "ENCRYPT") == HEARTBEAT
         nonces.add(Header.read(bytes(encoded[4:])).iv)
-        encoded = bytearray()
-        assert plugin.encode_datareader_submessage(encoded, ACKNACK, reader, [remote_writer]) is None
-        assert opened(bytes(encoded), [material], (SEC_PREFIX, SEC_POSTFIX), "ENCRYPT") == ACKNACK
+        encoded = octets_of(plugin.encode_datareader_submessage((ACKNACK,), reader, [remote_writer]))
+        assert opened(encoded, [material], (SEC_PREFIX, SEC_POSTFIX), "ENCRYPT") == ACKNACK
         nonces.add(Header.read(bytes(encoded[4:])).iv)
     assert len(nonces) == 40

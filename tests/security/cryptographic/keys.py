@@ -6,6 +6,7 @@ import random
 from dataclasses import dataclass
 from enum import Enum
 
+from ddsi.spi import Parts, Refused
 from ddsi.structure.qos_policies import Properties
 from ddsi_security.attributes import EndpointSecurityAttributes, ParticipantSecurityAttributes
 from ddsi_security.cryptographic import AesGcmGmac
@@ -40,6 +41,12 @@ class Kind(Enum):
 
 
 PROTECTED = [kind for kind in Kind if kind is not Kind.NONE]
+
+
+def octets_of(parts: Parts | Refused) -> bytes:
+    """What an encoder returned, as it goes over the wire."""
+    assert not isinstance(parts, Refused), parts
+    return b"".join(parts)
 
 
 def endpoint_attributes(metadata: Kind, data: Kind = Kind.NONE) -> EndpointSecurityAttributes:

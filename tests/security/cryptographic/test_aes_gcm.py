@@ -23,14 +23,31 @@ def _has_into(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.usefixtures("_has_into")
 @pytest.mark.parametrize("size", [0, 1, aes_gcm.LARGE + 5, 1 << 17])
 @pytest.mark.parametrize("kind", [bytes, bytearray, memoryview])
-def test_encrypting_appends_the_cipher_text_and_returns_the_tag(size: int, kind: type) -> None:
-    plain = random.Random(size).randbytes(size)
-    buffer = bytearray(b"before")
-    tag = aes_gcm.append_encrypted(buffer, kind(plain), AEAD, NONCE, spare=24)
-    buffer += b"behind"
+def test_encrypting_puts_the_cipher_text_and_its_tag_between_what_stands_around_it(size: int, kind: type) -> None:
+    scratch, dice = aes_gcm.Scratch(), random.Random(size)
+    for length in (size, size, size + 1):
+        plain = dice.randbytes(length)
+        found = aes_gcm.encrypt_between(b"before", kind(plain), b"behind", AEAD, NONCE, scratch)
+        assert found == b"before" + AEAD.encrypt(NONCE, plain, None) + b"behind"
+
+
+@pytest.mark.usefixtures("_has_into")
+def test_a_room_is_as_large_as_asked_for() -> None:
+    scratch = aes_gcm.Scratch()
+    for length in (100, 100, 7, 0, 1 << 16, 100, 1 << 17, 1 << 17, 100):
+        assert len(scratch.room(length)) == length
+
+
+@pytest.mark.usefixtures("_has_into")
+@pytest.mark.parametrize("size", [0, aes_gcm.LARGE])
+def test_decrypting_into_a_room(size: int) -> None:
+    plain, room = random.Random(size).randbytes(size), memoryview(bytearray(size))
+    decrypt_into = aes_gcm.decrypter_into(AEAD)
     sealed = AEAD.encrypt(NONCE, plain, None)
-    assert buffer == b"before" + sealed[:-16] + b"behind"
-    assert tag == sealed[-16:]
+    decrypt_into(NONCE, sealed, None, room)
+    assert room == plain
+    with pytest.raises(InvalidTag):
+        decrypt_into(NONCE, sealed[:-1] + bytes((sealed[-1] ^ 1,)), None, room)
 
 
 @pytest.mark.usefixtures("_has_into")

@@ -15,6 +15,7 @@ from tests.security.cryptographic.keys import (
     Kind,
     Participant,
     endpoint_attributes,
+    octets_of,
     participant_attributes,
 )
 
@@ -61,12 +62,12 @@ def test_tokens_of_participants_are_taken(kind: Kind) -> None:
 def test_messages_both_ways(kind: Kind) -> None:
     met = Meeting(kind)
     plugin, cyclone = met.alice.plugin, met.cyclone
-    buffer = bytearray()
-    assert plugin.encode_rtps_message(buffer, vectors.MESSAGE, met.alice.handle, [met.our_bob]) is None
-    found = cyclone.decode_message(bytes(buffer), met.bob, met.their_alice)
+    buffer = octets_of(plugin.encode_rtps_message((vectors.MESSAGE,), met.alice.handle, [met.our_bob]))
+    found = cyclone.decode_message(buffer, met.bob, met.their_alice)
     assert found == vectors.MESSAGE_HEADER + vectors.INFO_SOURCE + vectors.HEARTBEAT, cyclone.reason
-    buffer[60] ^= 1
-    assert cyclone.decode_message(bytes(buffer), met.bob, met.their_alice) is None
+    altered = bytearray(buffer)
+    altered[60] ^= 1
+    assert cyclone.decode_message(bytes(altered), met.bob, met.their_alice) is None
     theirs = cyclone.encode_message(vectors.MESSAGE, met.bob, [met.their_alice])
     assert theirs is not None, cyclone.reason
     assert plugin.decode_rtps_message(theirs, met.alice.handle, met.our_bob) == vectors.MESSAGE
@@ -87,11 +88,10 @@ def test_our_writer_and_their_reader(kind: Kind) -> None:
     theirs = cyclone.create_tokens("datareader", reader, their_writer)
     assert plugin.set_remote_datareader_crypto_tokens(writer, our_reader, theirs) is None
 
-    payload, submessage = bytearray(), bytearray()
-    assert plugin.encode_serialized_payload(payload, bytearray(), vectors.PAYLOAD, writer) is None
-    assert cyclone.decode_payload(bytes(payload), reader, their_writer) == vectors.PAYLOAD, cyclone.reason
-    assert plugin.encode_datawriter_submessage(submessage, vectors.HEARTBEAT, writer, [our_reader]) is None
-    assert cyclone.decode_submessage(bytes(submessage), reader, their_writer) == vectors.HEARTBEAT, cyclone.reason
+    payload = octets_of(plugin.encode_serialized_payload(bytearray(), vectors.PAYLOAD, writer))
+    assert cyclone.decode_payload(payload, reader, their_writer) == vectors.PAYLOAD, cyclone.reason
+    submessage = octets_of(plugin.encode_datawriter_submessage((vectors.HEARTBEAT,), writer, [our_reader]))
+    assert cyclone.decode_submessage(submessage, reader, their_writer) == vectors.HEARTBEAT, cyclone.reason
 
 
 @pytest.mark.parametrize("kind", PROTECTED)
@@ -116,9 +116,8 @@ def test_their_writer_and_our_reader(kind: Kind) -> None:
     submessage = cyclone.encode_submessage(vectors.HEARTBEAT, writer, [their_reader])
     assert submessage is not None, cyclone.reason
     assert plugin.decode_datawriter_submessage(submessage, reader, our_writer) == vectors.HEARTBEAT
-    answer = bytearray()
-    assert plugin.encode_datareader_submessage(answer, vectors.HEARTBEAT, reader, [our_writer]) is None
-    assert cyclone.decode_answer(bytes(answer), writer, their_reader) == vectors.HEARTBEAT, cyclone.reason
+    answer = octets_of(plugin.encode_datareader_submessage((vectors.HEARTBEAT,), reader, [our_writer]))
+    assert cyclone.decode_answer(answer, writer, their_reader) == vectors.HEARTBEAT, cyclone.reason
 
 
 def test_volatile_submessages_both_ways() -> None:
@@ -130,9 +129,8 @@ def test_volatile_submessages_both_ways() -> None:
     name = str(VOLATILE_READER["dds.sec.builtin_endpoint_name"])
     reader = cyclone.register_local("datareader", met.bob, flags=(True, False), mask=1, name=name)
     their_writer = cyclone.register_matched_remote("datawriter", reader, met.their_alice)
-    buffer = bytearray()
-    assert plugin.encode_datawriter_submessage(buffer, vectors.VOLATILE_HEARTBEAT, our_local, [our_remote]) is None
-    found = cyclone.decode_submessage(bytes(buffer), reader, their_writer)
+    buffer = octets_of(plugin.encode_datawriter_submessage((vectors.VOLATILE_HEARTBEAT,), our_local, [our_remote]))
+    found = cyclone.decode_submessage(buffer, reader, their_writer)
     assert found == vectors.VOLATILE_HEARTBEAT, cyclone.reason
 
     our_reader = plugin.register_local_datareader(met.alice.handle, VOLATILE_READER, attributes)

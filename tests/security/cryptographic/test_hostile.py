@@ -25,6 +25,7 @@ from tests.security.cryptographic.keys import (
     endpoint_attributes,
     match,
     material,
+    octets_of,
     pair,
     receiver_key,
     ring,
@@ -294,9 +295,8 @@ def test_envelopes_of_another_form_are_rejected(octets: bytes) -> None:
 )
 def test_signed_octets_that_are_no_submessage_are_rejected(content: bytes) -> None:
     """Whatever the MAC says, so these are not forged ones: the key signed them."""
-    buffer = bytearray()
-    assert seal_submessage(buffer, content, sending_key(material(GMAC)), []) is None
-    assert isinstance(open_signed(bytes(buffer)), Rejected)
+    buffer = octets_of(seal_submessage((content,), sending_key(material(GMAC)), []))
+    assert isinstance(open_signed(buffer), Rejected)
 
 
 @pytest.mark.parametrize(
@@ -313,9 +313,8 @@ def test_signed_octets_that_are_no_submessage_are_rejected(content: bytes) -> No
     ],
 )
 def test_encrypted_octets_that_are_no_submessage_are_rejected(content: bytes) -> None:
-    buffer = bytearray()
-    assert seal_submessage(buffer, content, sending_key(), []) is None
-    assert isinstance(open_encrypted(bytes(buffer)), Rejected)
+    buffer = octets_of(seal_submessage((content,), sending_key(), []))
+    assert isinstance(open_encrypted(buffer), Rejected)
 
 
 @pytest.mark.parametrize(
@@ -329,9 +328,8 @@ def test_encrypted_octets_that_are_no_submessage_are_rejected(content: bytes) ->
 )
 def test_any_one_submessage_is_opened(content: bytes) -> None:
     for kind, open_it in ((GCM, open_encrypted), (GMAC, open_signed)):
-        buffer = bytearray()
-        assert seal_submessage(buffer, content, sending_key(material(kind)), []) is None
-        assert open_it(bytes(buffer)) == content
+        buffer = octets_of(seal_submessage((content,), sending_key(material(kind)), []))
+        assert open_it(buffer) == content
 
 
 def _big_endian(octets: bytes, at: int) -> bytes:
@@ -417,30 +415,27 @@ def test_the_first_submessage_must_be_info_source(
 ) -> None:
     kind = GCM if encrypted else GMAC
     rest = vectors.HEARTBEAT if not size else b"\x15\x05" + size.to_bytes(2, "little") + bytes(size)
-    inner = bytearray()
     # A submessage's envelope with the numbers of a message's.
-    assert seal_submessage(inner, info_source + rest, sending_key(material(kind)), []) is None
+    inner = bytearray(octets_of(seal_submessage((info_source + rest,), sending_key(material(kind)), [])))
     inner[0] = 0x33
     inner[-24] = 0x34
     open_it = opener(opening.open_message, kind, origin=False)
-    found = open_it(vectors.MESSAGE_HEADER + bytes(inner))
+    found = open_it(vectors.MESSAGE_HEADER + inner)
     assert (found == vectors.MESSAGE_HEADER + rest) is accepted
     assert accepted or isinstance(found, Rejected)
 
 
 def test_a_message_in_a_message_is_not_opened_twice() -> None:
     for kind in (GCM, GMAC):
-        inner, outer = bytearray(), bytearray()
-        assert seal_message(inner, vectors.MESSAGE, sending_key(material(kind)), []) is None
-        assert seal_message(outer, bytes(inner), sending_key(material(kind)), []) is None
-        assert opener(opening.open_message, kind, origin=False)(bytes(outer)) == inner
+        inner = octets_of(seal_message((vectors.MESSAGE,), sending_key(material(kind)), []))
+        outer = octets_of(seal_message((inner,), sending_key(material(kind)), []))
+        assert opener(opening.open_message, kind, origin=False)(outer) == inner
 
 
 def test_a_signed_message_holds_protected_submessages() -> None:
     inside = vectors.MESSAGE_HEADER + vectors.HEARTBEAT_ENCRYPTED + vectors.HEARTBEAT_SIGNED_FOR_ONE
-    buffer = bytearray()
-    assert seal_message(buffer, inside, sending_key(material(GMAC)), []) is None
-    assert opener(opening.open_message, GMAC, origin=False)(bytes(buffer)) == inside
+    buffer = octets_of(seal_message((inside,), sending_key(material(GMAC)), []))
+    assert opener(opening.open_message, GMAC, origin=False)(buffer) == inside
 
 
 # --- receiver-specific MACs ------------------------------------------------------------------------------------------
@@ -449,9 +444,8 @@ def test_a_signed_message_holds_protected_submessages() -> None:
 @pytest.mark.parametrize("kind", [GCM, GMAC])
 def test_without_any_mac_it_is_rejected(kind: TransformationKind) -> None:
     open_it = opener(opening.open_submessage, kind, origin=True)
-    buffer = bytearray()
-    assert seal_submessage(buffer, vectors.HEARTBEAT, sending_key(material(kind)), []) is None
-    assert isinstance(open_it(bytes(buffer)), Rejected)
+    buffer = octets_of(seal_submessage((vectors.HEARTBEAT,), sending_key(material(kind)), []))
+    assert isinstance(open_it(buffer), Rejected)
 
 
 def test_ours_is_found_among_many_and_the_first_counts() -> None:
@@ -483,11 +477,8 @@ def test_what_is_for_others_only_is_so_by_its_common_mac() -> None:
 
 
 def test_a_key_without_receivers_key_cannot_authenticate_the_origin() -> None:
-    buffer = bytearray()
-    assert seal_submessage(buffer, vectors.HEARTBEAT, sending_key(), [receiver_key()]) is None
-    found = opening.open_submessage(
-        bytes(buffer), ring(material()), Protection(encrypted=True, origin_authenticated=True)
-    )
+    buffer = octets_of(seal_submessage((vectors.HEARTBEAT,), sending_key(), [receiver_key()]))
+    found = opening.open_submessage(buffer, ring(material()), Protection(encrypted=True, origin_authenticated=True))
     assert isinstance(found, Rejected)
 
 

@@ -9,6 +9,7 @@ import pytest
 from ddsi_security.cryptographic.aes_gcm import LARGE
 from ddsi_security.cryptographic.openers import (
     MessageOpener,
+    SignedMessageOpener,
     SubmessageOpener,
     message_opener,
     payload_opener,
@@ -20,7 +21,7 @@ from ddsi_security.cryptographic.received_keys import KeyRing
 from ddsi_security.cryptographic.sealing import seal_message, seal_submessage
 from ddsi_security.cryptographic.session_keys import SendingKey
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
-from tests.security.cryptographic.keys import material, ring, sending_key
+from tests.security.cryptographic.keys import material, octets_of, ring, sending_key
 
 ENCRYPTED = Protection(encrypted=True)
 SIZES = (8, 400, LARGE - 60, LARGE - 56, 65_000)
@@ -31,9 +32,7 @@ def submessage(size: int, kind: int = 0x15, flags: int = 5) -> bytes:
 
 
 def sealed(plain: bytes, key: SendingKey) -> bytes:
-    buffer = bytearray()
-    assert seal_submessage(buffer, plain, key, ()) is None
-    return bytes(buffer)
+    return octets_of(seal_submessage((plain,), key, ()))
 
 
 def opener_of(first: bytes, keys: KeyRing) -> SubmessageOpener:
@@ -125,12 +124,10 @@ HEADER = b"RTPS\2\5\1\xdd" + bytes(range(12))
 
 
 def sealed_message(size: int, key: SendingKey, header: bytes = HEADER) -> bytes:
-    buffer = bytearray()
-    assert seal_message(buffer, header + submessage(size), key, ()) is None
-    return bytes(buffer)
+    return octets_of(seal_message((header + submessage(size),), key, ()))
 
 
-def message_keys(expected: Protection) -> tuple[KeyRing, SendingKey, MessageOpener]:
+def message_keys(expected: Protection) -> tuple[KeyRing, SendingKey, MessageOpener | SignedMessageOpener]:
     of = material(KINDS[expected])
     keys, key = ring(of), sending_key(of)
     first = sealed_message(24, key)
@@ -218,6 +215,4 @@ def test_altered_payloads_are_left_to_the_general_way(size: int, at: int) -> Non
 
 
 def protected_payload(plain: bytes, key: SendingKey) -> bytes:
-    buffer = bytearray()
-    assert encode_payload(buffer, plain, key) is None
-    return bytes(buffer)
+    return octets_of(encode_payload(plain, key))

@@ -11,7 +11,7 @@ from ddsi_security.cryptographic.received_keys import KeyRing
 from ddsi_security.cryptographic.session_keys import SendingKey
 from ddsi_security.cryptographic.transformation import TransformationKind
 from tests.security.cryptographic import vectors
-from tests.security.cryptographic.keys import material, ring
+from tests.security.cryptographic.keys import material, octets_of, ring
 
 SECOND = 10**9
 
@@ -24,9 +24,8 @@ def protected(of: KeyMaterial, *, seed: int = 1, max_blocks: int = 1 << 32, coun
     key = SendingKey(of, random.Random(seed).randbytes, max_blocks=max_blocks)
     found = []
     for _ in range(count):
-        buffer = bytearray()
-        assert payload.encode_payload(buffer, vectors.PAYLOAD, key) is None
-        found.append(bytes(buffer))
+        buffer = octets_of(payload.encode_payload(vectors.PAYLOAD, key))
+        found.append(buffer)
     return found
 
 

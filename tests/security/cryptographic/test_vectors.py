@@ -9,7 +9,7 @@ from ddsi_security.cryptographic.key_material import KeyMaterial, exchange_key_m
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from ddsi_security.handles import SharedSecretHandle
 from tests.security.cryptographic import vectors
-from tests.security.cryptographic.keys import entropy_of, material, receiver_key, ring, sending_key
+from tests.security.cryptographic.keys import entropy_of, material, octets_of, receiver_key, ring, sending_key
 
 GCM, GMAC, GCM128 = TransformationKind.AES256_GCM, TransformationKind.AES256_GMAC, TransformationKind.AES128_GCM
 
@@ -68,8 +68,7 @@ def test_key_material(found: KeyMaterial, octets: bytes) -> None:
 
 @pytest.mark.parametrize(("kind", "protected"), PAYLOADS)
 def test_payload(kind: TransformationKind, protected: bytes) -> None:
-    buffer = bytearray()
-    assert payload.encode_payload(buffer, vectors.PAYLOAD, sending_key(material(kind))) is None
+    buffer = octets_of(payload.encode_payload(vectors.PAYLOAD, sending_key(material(kind))))
     assert buffer == protected
     assert payload.decode_payload(protected, ring(material(kind)), Protection(kind.encrypts)) == vectors.PAYLOAD
 
@@ -77,8 +76,7 @@ def test_payload(kind: TransformationKind, protected: bytes) -> None:
 @pytest.mark.parametrize(("kind", "for_receiver", "plain", "protected"), SUBMESSAGES)
 def test_submessage(kind: TransformationKind, for_receiver: bool, plain: bytes, protected: bytes) -> None:
     receivers = [receiver_key()] if for_receiver else []
-    buffer = bytearray()
-    assert sealing.seal_submessage(buffer, plain, sending_key(material(kind)), receivers) is None
+    buffer = octets_of(sealing.seal_submessage((plain,), sending_key(material(kind)), receivers))
     assert buffer == protected
     keys = ring(material(kind, for_receiver=for_receiver))
     assert opening.open_submessage(protected, keys, Protection(kind.encrypts, for_receiver)) == plain
@@ -88,8 +86,7 @@ def test_submessage(kind: TransformationKind, for_receiver: bool, plain: bytes, 
 def test_message(kind: TransformationKind, for_receiver: bool, plain: bytes, protected: bytes) -> None:
     assert vectors.INFO_SOURCE[8:] == vectors.MESSAGE_HEADER[4:]
     receivers = [receiver_key()] if for_receiver else []
-    buffer = bytearray()
-    assert sealing.seal_message(buffer, plain, sending_key(material(kind)), receivers) is None
+    buffer = octets_of(sealing.seal_message((plain,), sending_key(material(kind)), receivers))
     assert buffer == protected
     keys = ring(material(kind, for_receiver=for_receiver))
     assert opening.open_message(protected, keys, Protection(kind.encrypts, for_receiver)) == plain
@@ -97,8 +94,7 @@ def test_message(kind: TransformationKind, for_receiver: bool, plain: bytes, pro
 
 def test_volatile_submessage() -> None:
     key = session_keys.SendingKey(exchange_material(), entropy_of(vectors.SESSION_ID, vectors.SUFFIX))
-    buffer = bytearray()
-    assert sealing.seal_submessage(buffer, vectors.VOLATILE_HEARTBEAT, key, []) is None
+    buffer = octets_of(sealing.seal_submessage((vectors.VOLATILE_HEARTBEAT,), key, []))
     assert buffer == vectors.VOLATILE_HEARTBEAT_ENCRYPTED
-    opened = opening.open_submessage(bytes(buffer), ring(exchange_material()), Protection(encrypted=True))
+    opened = opening.open_submessage(buffer, ring(exchange_material()), Protection(encrypted=True))
     assert opened == vectors.VOLATILE_HEARTBEAT

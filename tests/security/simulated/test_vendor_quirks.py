@@ -6,7 +6,7 @@ Both authenticate, exchange keys, and get every reliable sample of the other, sm
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -393,7 +393,7 @@ def test_discovery_in_clear_is_taken_from_cyclone_alone(identities: dict[str, li
 class AlwaysNonStandard(q.Quirk):
     """Flag N on everything."""
 
-    def say(self, sender: Guid, receivers: Sequence[Guid], submessage: Submessage) -> Submessage | None:
+    def say(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Submessage) -> Submessage | None:
         if not isinstance(submessage, Data | DataFrag) or sender.entity_id.is_builtin:
             return submessage
         return replace(submessage, non_standard_payload=True)
