@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from .annotations import BUILTIN
+from .directives import Directives
 from .expressions import KEYWORDS, ExpressionParser
 from .source_text import IdlError, IdlWarning
 from .syntax import (
@@ -86,6 +87,7 @@ class Parser(ExpressionParser):
     def __init__(self, tokens: Sequence[Token]) -> None:
         super().__init__([token for token in tokens if token.kind is not TokenKind.PRAGMA or _is_keylist(token)])
         self.warnings: list[IdlWarning] = []
+        self._directives = Directives(tokens, self.warnings)
         self._declared: set[str] = set()
         """Annotations that the text itself declares: for other programs, and no mistake."""
         self._constructed: dict[str, Callable[[], list[Definition]]] = {
@@ -125,10 +127,11 @@ class Parser(ExpressionParser):
             definitions = self._skipped()
         else:
             raise self.unexpected("a definition (module, struct, union, enum, typedef, const, ...)")
+        end = self.expect(";", f"behind the {word}")
         for definition in definitions:
-            definition.annotations = definition.annotations or annotations
+            said = definition.annotations or annotations
+            definition.annotations = [*said, *self._directives.behind(end, said)]
             definition.comment = comment
-        self.expect(";", f"behind the {word}")
         return definitions
 
     def _module(self) -> list[Definition]:
@@ -198,7 +201,8 @@ class Parser(ExpressionParser):
             )
         type_ = self._type()
         declarators = self._declarators("of the member")
-        self.expect(";", "behind the member")
+        end = self.expect(";", "behind the member")
+        annotations += self._directives.behind(end, annotations)
         return [
             MemberNode(type=type_, declarator=declarator, annotations=annotations, comment=comment)
             for declarator in declarators

@@ -1,19 +1,20 @@
 """The preprocessor: files to the tokens that the parser sees (OMG IDL 4.2 §7.3, ISO C as far as IDL files use it).
 
 ``#include`` in both forms, ``#define`` with and without parameters, ``#undef``, ``#if`` and its family, ``#error``,
-``#pragma once``; other pragmas reach the parser as one token.  Neither ``#`` nor ``##`` inside a macro.  Whatever a
-file says, includes, macros, conditions and tokens are bounded; beyond that it is refused.
+``#pragma once``; other pragmas reach the parser as one token.  Whatever a file says, includes, macros, conditions and
+tokens are bounded; beyond that it is refused.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
 from .conditions import evaluate_condition
+from .macros import Macro, arguments_of, macro_of, replacement
 from .source_text import IdlError, IdlWarning, Place, SourceText
 from .tokens import Token, TokenKind, refuse_odd, tokenize
 
@@ -33,13 +34,6 @@ MOST_OCTETS = 1 << 24
 """Of all files together, each as often as it is included."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Macro:
-    body: tuple[Token, ...]
-    parameters: tuple[str, ...] | None = None
-    """None for a macro without parentheses."""
-
-
 @dataclass(slots=True)
 class _Condition:
     """One ``#if`` that is open."""
@@ -57,7 +51,7 @@ class Preprocessor:
 
     def __init__(self, include: Sequence[Path], defines: Mapping[str, str]) -> None:
         self._include = include
-        self._macros = {name: _Macro(_body_of(name, value)) for name, value in defines.items()}
+        self._macros = {name: _macro_given(name, value) for name, value in defines.items()}
         self._once: set[Path] = set()
         self._includes = 0
         self._tokens = 0
@@ -244,14 +238,7 @@ class Preprocessor:
     def _define(self, place: Place, arguments: list[Token]) -> None:
         if not arguments or arguments[0].kind is not TokenKind.NAME:
             raise IdlError(arguments[0].place if arguments else place, "expected a name behind #define")
-        name, rest = arguments[0], arguments[1:]
-        parameters: tuple[str, ...] | None = None
-        if rest and rest[0].text == "(" and not rest[0].spaced:
-            parameters, rest = _parameters(name, rest)
-        for token in rest:
-            if token.text in ("#", "##"):
-                raise IdlError(token.place, f"'{token.text}' inside a macro is not supported")
-        self._macros[name.text] = _Macro(tuple(rest), parameters)
+        self._macros[arguments[0].text] = macro_of(arguments[0], arguments[1:])
 
     def _expand(self, pending: deque[Token], depth: int = 0) -> Iterator[Token]:
         """Expand macros in ``pending``, which is empty afterwards.
@@ -269,15 +256,15 @@ class Preprocessor:
             if macro is None or hidden.get(token.text, 0):
                 yield token
                 continue
-            body: Iterable[Token] = macro.body
+            arguments: list[list[Token]] = []
             if macro.parameters is not None:
                 if not pending or pending[0].text != "(":
                     yield token
                     continue
                 if depth >= DEEPEST_CALL:
                     raise IdlError(token.place, f"calls of macros nest deeper than {DEEPEST_CALL}")
-                arguments = [list(self._expand(deque(argument), depth + 1)) for argument in _arguments(token, pending)]
-                body = _substituted(token, macro, arguments)
+                arguments = arguments_of(token, pending)
+            body = replacement(token, macro, arguments, lambda argument: list(self._expand(deque(argument), depth + 1)))
             after = len(pending)
             placed = [
                 Token(part.kind, part.text, token.place, spaced=part.spaced)
@@ -285,7 +272,7 @@ class Preprocessor:
             ]
             if placed:
                 placed[0].comment = token.comment
-            self._expanded += len(placed) + 1
+            self._expanded += max(len(placed), len(macro.body)) + 1  # empty arguments leave nothing of much work
             if self._expanded > MOST_EXPANDED:
                 raise IdlError(token.place, f"the macros expand to more than {MOST_EXPANDED} tokens")
             pending.extendleft(reversed(placed))
@@ -308,9 +295,14 @@ def read_source(path: Path, place: Place | None = None) -> SourceText:
     return source
 
 
-def _body_of(name: str, value: str) -> tuple[Token, ...]:
+def _macro_given(name: str, value: str) -> Macro:
+    """One of ``defines``."""
     source = SourceText(f"<definition of {name}>", str(value))
-    return tuple(token for token in tokenize(source) if token.kind is not TokenKind.END)
+    named = Token(TokenKind.NAME, name, Place(source, 0))
+    body = [token for token in tokenize(source) if token.kind is not TokenKind.END]
+    if body:
+        body[0].spaced = True  # it has no parameters
+    return macro_of(named, body)
 
 
 def _one_name(place: Place, arguments: list[Token], directive: str) -> Token:
@@ -329,47 +321,6 @@ def _included_name(place: Place, arguments: list[Token]) -> tuple[str, bool]:
         if ">" in line:
             return line[: line.index(">")].strip(), False
     raise IdlError(arguments[0].place if arguments else place, 'expected "file" or <file> behind #include')
-
-
-def _parameters(name: Token, rest: list[Token]) -> tuple[tuple[str, ...], list[Token]]:
-    found: list[str] = []
-    for index in range(1, len(rest)):
-        token = rest[index]
-        if token.text == ")":
-            return tuple(found), rest[index + 1 :]
-        if index % 2 == 0 and token.text != ",":
-            raise IdlError(token.place, f"expected ',' or ')' in the parameters of {name.text}, found {token}")
-        if index % 2 == 1:
-            if token.kind is not TokenKind.NAME:
-                raise IdlError(token.place, f"expected a parameter of {name.text}, found {token}")
-            found.append(token.text)
-    raise IdlError(name.place, f"the parameters of {name.text} have no end; expected ')'")
-
-
-def _arguments(name: Token, pending: deque[Token]) -> list[list[Token]]:
-    """The arguments of a call, taken from ``pending``, which begins with their parenthesis."""
-    pending.popleft()
-    arguments: list[list[Token]] = [[]]
-    depth = 0
-    while pending:
-        token = pending.popleft()
-        if token.text == ")" and depth == 0:
-            return arguments
-        if token.text == "," and depth == 0:
-            arguments.append([])
-            continue
-        depth += {"(": 1, ")": -1}.get(token.text, 0)
-        arguments[-1].append(token)
-    raise IdlError(name.place, f"the arguments of {name.text} have no end; expected ')'")
-
-
-def _substituted(name: Token, macro: _Macro, arguments: list[list[Token]]) -> Iterator[Token]:
-    parameters = macro.parameters or ()
-    if len(arguments) != len(parameters) and not (not parameters and arguments == [[]]):
-        raise IdlError(name.place, f"{name.text} takes {len(parameters)} arguments, not {len(arguments)}")
-    given = dict(zip(parameters, arguments, strict=False))
-    for token in macro.body:
-        yield from given.get(token.text, (token,)) if token.kind is TokenKind.NAME else (token,)
 
 
 def _is_active(conditions: Sequence[_Condition]) -> bool:

@@ -1,9 +1,10 @@
 """The lexer: text to tokens (OMG IDL 4.2 §7.2), for the preprocessor and the parser alike.
 
 Comments are dropped, but the comment right before a token stays with it, since it may describe what the token
-begins.  A backslash at the end of a line joins it to the next.  ``>`` is always a token of its own: two of them close
-nested templates, or are a shift, as the parser finds.  What is no token of IDL is an odd one, and refused only where it
-matters (:func:`refuse_odd`): conditions may leave out text in other languages.  Time is linear in the text.
+begins, and so do comments ``//@...`` behind it.  A backslash at the end of a line joins it to the next.  ``>`` is always
+a token of its own: two of them close nested templates, or are a shift, as the parser finds.  What is no token of IDL is
+an odd one, and refused only where it matters (:func:`refuse_odd`): conditions may leave out text in other languages.
+Time is linear in the text.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from enum import Enum
 
 from .source_text import IdlError, Place, SourceText
 
-__all__ = ["Token", "TokenKind", "refuse_odd", "tokenize"]
+__all__ = ["Token", "TokenKind", "kind_of", "refuse_odd", "tokenize"]
 
 
 class TokenKind(Enum):
@@ -43,6 +44,8 @@ class Token:
     """White space or a comment is before it."""
     comment: str = ""
     """What the comment before it says."""
+    directives: tuple[tuple[str, Place], ...] = ()
+    """What comments ``//@...`` behind it say, without these three characters, and where."""
 
     def __str__(self) -> str:
         return self.kind.value if self.kind is TokenKind.END else f"'{self.text}'"
@@ -66,6 +69,9 @@ _NUMBER = re.compile(
 _LONGEST_NUMBER = 400
 """Digits; Python takes quadratic time to read more of them."""
 
+_MOST_DIRECTIVES = 16
+"""Behind one token."""
+
 _KINDS = {
     "string": TokenKind.STRING,
     "character": TokenKind.CHARACTER,
@@ -80,6 +86,7 @@ def tokenize(source: SourceText) -> Iterator[Token]:
     """The tokens of a text, the end as the last.  IdlError for a comment without end."""
     text, position, end = source.text, 0, len(source.text)
     starts_line, spaced, comments = True, False, list[str]()
+    token: Token | None = None
     while position < end:
         character = text[position]
         if character == "\n":
@@ -89,7 +96,10 @@ def tokenize(source: SourceText) -> Iterator[Token]:
         elif found := _SPACE.match(text, position):
             spaced, position = True, found.end()
         elif text.startswith("//", position) or text.startswith("/*", position):
+            start = position
             position, comment = _comment(source, position)
+            if text.startswith("//@", start) and token is not None and len(token.directives) < _MOST_DIRECTIVES:
+                token.directives += ((comment.removeprefix("@"), Place(source, start)),)
             if starts_line:  # one behind something else on the line belongs to that
                 comments.append(comment)
             spaced = True
@@ -100,9 +110,19 @@ def tokenize(source: SourceText) -> Iterator[Token]:
                 kind, word = _KINDS[found.lastgroup or ""], found.group()
                 if kind in (TokenKind.INTEGER, TokenKind.FLOATING) and not _is_number(word):
                     kind = TokenKind.ODD
-            yield Token(kind, word, Place(source, position), starts_line, spaced, "\n".join(comments))
+            token = Token(kind, word, Place(source, position), starts_line, spaced, "\n".join(comments))
+            yield token
             starts_line, spaced, comments, position = False, False, [], position + len(word)
     yield Token(TokenKind.END, "", Place(source, end), True, True)
+
+
+def kind_of(text: str) -> TokenKind | None:
+    """What ``text`` is as a token of its own; None if it is not one token."""
+    found = _TOKEN.fullmatch(text)
+    if found is None:
+        return None
+    kind = _KINDS[found.lastgroup or ""]
+    return kind if kind not in (TokenKind.INTEGER, TokenKind.FLOATING) or _is_number(text) else TokenKind.ODD
 
 
 def _is_number(text: str) -> bool:

@@ -244,7 +244,12 @@ ERRORS: dict[str, tuple[str, int, int, str]] = {
     "error directive": ("#if 1\n#error Not for you\n#endif", 2, 1, "#error Not for you"),
     "macro arguments": ("#define F(a, b) a\nconst long N = F(1);", 2, 16, "F takes 2 arguments, not 1"),
     "open macro": ("#define F(a) a\nconst long N = F(1;", 2, 16, "the arguments of F have no end; expected ')'"),
-    "joining": ("#define F(a) a ## a", 1, 16, "'##' inside a macro is not supported"),
+    "joining nothing": ("#define F(a) a ##", 1, 16, "'##' joins two tokens, and stands at an end of F"),
+    "joining to nothing": ("#define F ## a", 1, 11, "'##' joins two tokens, and stands at an end of F"),
+    "joined": ("#define F(a) a ## -\nconst long N = F(1);", 2, 16, "'1' and '-', joined by '##', are no token"),
+    "joined comment": ("#define F(a) / ## a\nconst long N = F(/);", 2, 16, "'/' and '/', joined by '##', are no token"),
+    "string of no parameter": ("#define F(a) #b", 1, 14, "expected a parameter of F behind '#'"),
+    "string of nothing": ("#define F(a) a #", 1, 16, "expected a parameter of F behind '#'"),
 }
 
 

@@ -34,6 +34,12 @@ HOSTILE: dict[str, tuple[str, str]] = {
         "#define F(x) x x\n" + "F(" * 40 + "1" + ")" * 40,
         "the macros expand to more than 100000 tokens",
     ),
+    "growing names": ("#define F(x) x" + " ## x" * 200 + "\nlong F(" + "a" * 100 + ")", "joined by '##', are no token"),
+    "growing strings": ("#define F(x) #x\nF(" + "a " * 1000 + ")", "the string that F makes has more than 1000"),
+    "work for nothing": (
+        "#define F(x) x" + " ## x" * 10_000 + "\n" + "F() " * 10_000,
+        "the macros expand to more than 100000 tokens",
+    ),
     "nested calls": (
         "#define F(x) x\nconst long N = " + "F(" * 200 + "1" + ")" * 200 + ";",
         "calls of macros nest deeper",

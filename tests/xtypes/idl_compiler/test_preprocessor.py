@@ -19,6 +19,20 @@ CONSTANTS: dict[str, tuple[str, int]] = {
     "without a call": ("const long F = 5;\n#define F(x) x\nconst long N = F;", 5),
     "over lines": ("#define F(a, b) (a \\\n  - b)\nconst long N = F(\n  5,\n  2);", 3),
     "without parameters": ("#define F() 7\nconst long N = F();", 7),
+    "joined": ("#define F(a, b) a ## b\nconst long N = F(1, 2);", 12),
+    "joined names": ("const long CD = 3;\n#define F(x) C ## x\nconst long N = F(D);", 3),
+    "joined to a macro": ("#define AB 4\n#define F(a, b) a ## b\nconst long N = F(A, B);", 4),
+    "joined unexpanded": ("#define A 9\nconst long AB = 5;\n#define F(a) a ## B\nconst long N = F(A);", 5),
+    "joined expanded": (
+        "#define A 1\n#define J(a, b) a ## b\n#define F(a, b) J(a, b)\nconst long N = F(A, 2);",
+        12,
+    ),
+    "joined three": ("#define F(a, b, c) a##b##c\nconst long N = F(0, x, 1F);", 31),
+    "joined operator": ("#define S < ## <\nconst long N = 1 S 3;", 8),
+    "joined more than one": ("#define F(a, b) a ## b\nconst long N = F(1 + 1, 2 + 3);", 16),
+    "joined nothing": ("#define F(a, b) 7 a ## b\nconst long N = F(,);", 7),
+    "joined to nothing": ("#define F(a, b) 1 + a ## b ## 2\nconst long N = F(3,);", 33),
+    "joined result is no operator": ("#define H # ## #\n#define F(x) x\n#define G H\nconst long N = F(1);", 1),
     "ifdef": ("#define A\n#ifdef A\nconst long N = 1;\n#else\nconst long N = 2;\n#endif", 1),
     "ifndef": ("#ifndef A\nconst long N = 1;\n#else\nconst long N = 2;\n#endif", 1),
     "elif": ("#if 0\n#elif 1\nconst long N = 2;\n#elif 1\nconst long N = 3;\n#else\nconst long N = 4;\n#endif", 2),
@@ -45,8 +59,36 @@ def test_macros_and_conditions(name: str) -> None:
     assert expected == idl.loads(text).N
 
 
+STRINGS = {
+    "its own words": ("F(a  +\n b)", "a + b"),
+    "not what macros make of them": ("F(A)", "A"),
+    "expanded before": ("G(A)", "5"),
+    "quotes": (r'F("a\n" \'"\')', r""" "a\n" '"' """.strip()),
+    "commas in parentheses": ("F((a, b))", "(a, b)"),
+    "nothing": ("F( )", ""),
+}
+
+
+@pytest.mark.parametrize("name", STRINGS)
+def test_an_argument_becomes_a_string(name: str) -> None:
+    text, expected = STRINGS[name]
+    macros = "#define A 5\n#define F(x) # x\n#define G(x) F(x)\n"
+    assert expected == idl.loads(f"{macros}const string S = {text};").S
+
+
+def test_an_argument_names_a_type_and_its_members() -> None:
+    types = idl.loads(
+        """
+        #define POINT(name, type) struct name ## Point { @unit(#type) type name ## _x; type name ## _y; };
+        POINT(grid, long)
+        """
+    )
+    assert types.gridPoint(grid_x=1, grid_y=2).grid_y == 2
+
+
 def test_definitions_may_be_given() -> None:
     assert idl.loads("#if SIZE > 2\nconst long N = SIZE;\n#endif", defines={"SIZE": "1 + 2"}).N == 3
+    assert idl.loads("const long N = SIZE;", defines={"SIZE": "(1 ## 2)"}).N == 12
 
 
 def test_quoted_includes_look_beside_the_file_first(tmp_path: Path) -> None:
