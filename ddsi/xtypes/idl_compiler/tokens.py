@@ -1,10 +1,10 @@
 """The lexer: text to tokens (OMG IDL 4.2 §7.2), for the preprocessor and the parser alike.
 
 Comments are dropped, but the comment right before a token stays with it, since it may describe what the token
-begins, and so do comments ``//@...`` behind it.  A backslash at the end of a line joins it to the next.  ``>`` is always
-a token of its own: two of them close nested templates, or are a shift, as the parser finds.  What is no token of IDL is
-an odd one, and refused only where it matters (:func:`refuse_odd`): conditions may leave out text in other languages.
-Time is linear in the text.
+begins, and so do comments ``//@...`` behind it.  A backslash at the end of a line joins it to the next.  ``>`` is
+always a token of its own: two of them close nested templates, or are a shift, as the parser finds.  What is no token of
+IDL is an odd one, and refused only where it matters (:func:`refuse_odd`): conditions may leave out text in other
+languages.  Time is linear in the text.
 """
 
 from __future__ import annotations
