@@ -133,14 +133,22 @@ def _check_string(type_: String, value: Any, path: str) -> None:
     except UnicodeEncodeError as error:
         raise BadParameter(f"{path}: {_shown(value)} has no UTF-8 form ({error.reason})") from None
     if 0 in encoded:
-        raise BadParameter(f"{path}: {_shown(value)} contains a NUL, which ends a string on the wire")
+        raise _holds_nul(path, value)
     if type_.bound is not None and len(encoded) > type_.bound:
         raise BadParameter(f"{path}: a string of {len(encoded)} octets exceeds its bound of {type_.bound}")
 
 
+def _holds_nul(path: str, value: str) -> BadParameter:
+    """Others read a string up to its first NUL.  One may have been received: it is not sent on."""
+    return BadParameter(
+        f"{path}: {_shown(value)} contains a NUL, which ends a string for others; cut it there "
+        "(text.partition('\\0')[0]), or make the member an idl.sequence[idl.uint8]"
+    )
+
+
 def _check_wide_string(type_: String, value: str, path: str) -> None:
     if "\0" in value:
-        raise BadParameter(f"{path}: {_shown(value)} contains a NUL, which ends a string")
+        raise _holds_nul(path, value)
     units = len(value.encode("utf-16-le", "surrogatepass")) // 2
     if type_.bound is not None and units > type_.bound:
         raise BadParameter(f"{path}: a wide string of {units} characters exceeds its bound of {type_.bound}")
