@@ -107,8 +107,7 @@ class Listening:
         self._inner = entity._entity
         self._listener = listener
         self._is_stopped = False
-        self._had_data = False
-        self._events: dcps.EventStream = self._engine.run_now(self._begin)
+        self._events: dcps.EventStream = self._engine.run_now(self._inner.events)
         threading.Thread(target=self._run, name="ddsi listener", daemon=True).start()
 
     def stop(self) -> None:
@@ -117,8 +116,6 @@ class Listening:
         self._engine.post(self._events.close)
 
     def _run(self) -> None:
-        if self._had_data:
-            self._call(s.DataAvailable())
         while True:
             try:
                 happened = self._engine.run(self._next)
@@ -139,12 +136,6 @@ class Listening:
         except Exception as error:
             if not (isinstance(error, AlreadyDeleted) and self._inner.is_closed):  # it was closed under its hands
                 _log.exception("%r failed", self._listener)
-
-    def _begin(self) -> dcps.EventStream:
-        """In the engine's thread: listen, and look whether there are data already, of which no event tells."""
-        if isinstance(self._inner, SampleReader):
-            self._had_data = self._inner._tell()
-        return self._inner.events()
 
     async def _next(self) -> Status | None:
         """In the engine's thread: what happens next; None at the end."""

@@ -18,6 +18,7 @@ from ..structure.qos import Qos, reader_qos
 from ..structure.sample_info import SampleInfo
 from .conditions import ReadCondition
 from .data_reader import DataReader
+from .entity import EventStream
 from .groups import Subscriber
 from .multi_topic import MultiTopic
 from .sample import Sample
@@ -127,6 +128,10 @@ class MultiTopicReader(SampleReader[T]):
         self._absorb()
         return super().status_changes()
 
+    def events(self) -> EventStream:
+        self._absorb_if_allowed()
+        return super().events()
+
     # --- inside ------------------------------------------------------------------------------------------
 
     def _selection(
@@ -136,11 +141,14 @@ class MultiTopicReader(SampleReader[T]):
         self._absorb()
         return super()._selection(condition, sample_states, view_states, instance_states)
 
-    def _tell(self) -> bool:
+    def _tell(self) -> None:
         """What came to the parts is news to them again only when it was taken."""
+        self._absorb_if_allowed()
+        super()._tell()
+
+    def _absorb_if_allowed(self) -> None:
         with suppress(PreconditionNotMet):  # they may not be taken from: not enabled, or outside `subscriber.access()`
             self._absorb()
-        return super()._tell()
 
     async def _wait_for_news(self) -> None:
         self._pump.before_waiting()

@@ -236,11 +236,9 @@ class SampleReader(Entity, Generic[T]):
             )
         return max_samples
 
-    def _tell(self) -> bool:
-        """A listener is about to be told: has anything come?  The next arrival is news again, taken or not."""
-        has_news = self._history.has_news
+    def _tell(self) -> None:
+        """A listener is about to be told of what has come.  The next arrival is news again, taken or not."""
         self._history.seen()
-        return has_news
 
     def _check_iterable(self) -> None:
         """May samples be taken one after the other as they come?"""

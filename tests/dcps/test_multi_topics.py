@@ -105,6 +105,16 @@ async def test_two_topics_are_joined_as_their_samples_come(domain: int) -> None:
 
 
 @in_trio
+async def test_events_begin_with_what_is_joined_already(domain: int) -> None:
+    async with stage(domain) as here:
+        reader = here.reader(TWO, "100")
+        await here.write(Position(1, 10), Plan(1, "Ours"))
+        with trio.fail_after(5):
+            assert isinstance(await anext(reader.events()), ddsi.DataAvailable)
+        assert rows(reader.take()) == [(1, 10, "Ours", "?")]
+
+
+@in_trio
 async def test_a_row_ends_with_a_part_of_it_or_when_the_condition_no_longer_holds(domain: int) -> None:
     async with stage(domain) as here:
         reader = here.reader(TWO, "100")
