@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from typing import Any
 
@@ -9,7 +11,7 @@ import pytest
 import trio
 
 import ddsi
-from tests.dcps.running import RELIABLE, Note, Shape, eventually, in_trio, pair
+from tests.dcps.running import RELIABLE, Note, Pair, Shape, eventually, in_trio, pair
 
 NOT_DISPOSED = ddsi.Qos(writer_data_lifecycle=ddsi.WriterDataLifecycle(autodispose_unregistered_instances=False))
 
@@ -207,12 +209,19 @@ async def test_an_instance_that_is_unregistered_makes_room_for_another(domain: i
 # --- readers that are full when the writer goes -------------------------------------------------------------
 
 
-@pytest.mark.parametrize("local", [True, False])
-@in_trio
-async def test_a_writer_that_is_closed_lets_a_full_reader_take_the_rest(domain: int, local: bool) -> None:
+@asynccontextmanager
+async def full(domain: int, *, local: bool) -> AsyncIterator[Pair]:
+    """Five samples are written, and the reader has room for two."""
     async with pair(domain, reader=limited(2), local=local) as p:
         for number in range(5):
             await p.writer.write(Shape("RED", number))
+        yield p
+
+
+@pytest.mark.parametrize("local", [True, False])
+@in_trio
+async def test_a_writer_that_is_closed_lets_a_full_reader_take_the_rest(domain: int, local: bool) -> None:
+    async with full(domain, local=local) as p:
         p.writer.close()
         samples = [await anext(p.reader) for _ in range(6)]
         assert [sample.data.x for sample in samples if sample.info.valid_data] == list(range(5))
@@ -223,9 +232,7 @@ async def test_a_writer_that_is_closed_lets_a_full_reader_take_the_rest(domain: 
 @pytest.mark.parametrize("local", [True, False])
 @in_trio
 async def test_what_a_full_reader_had_no_room_for_when_the_match_ended_is_lost(domain: int, local: bool) -> None:
-    async with pair(domain, reader=limited(2), local=local) as p:
-        for number in range(5):
-            await p.writer.write(Shape("RED", number))
+    async with full(domain, local=local) as p:
         held = [] if local else list(p.reader._reader.behavior.writers.values())
         await eventually(lambda: all(len(proxy.reorder) == 3 for proxy in held))
         p.reader.set_qos(ddsi.Qos(partition=ddsi.Partition("elsewhere")))

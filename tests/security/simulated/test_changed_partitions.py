@@ -27,7 +27,8 @@ RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
 KEYLESS = {"writer": {"payload", "message", "nothing"}, "reader": {"message", "nothing"}}
 """Under which governances an endpoint needs no key of the other."""
 BLUE, ANY_BLUE, RED = (RELIABLE | Qos(partition=Partition(name)) for name in ("blue", "b*", "red"))
-
+either = pytest.mark.parametrize("who", ["writer", "reader"])
+every_governance = pytest.mark.parametrize("governance", GOVERNANCES)
 
 Identities = dict[str, list[Properties]]
 
@@ -57,16 +58,25 @@ def matched(identities: list[Properties]) -> tuple[Domain, NodeWriter, NodeReade
     domain = Domain()
     alice, bob = (domain.node(properties=properties) for properties in identities)
     writer, reader = alice.writer("Square", BLUE), bob.reader("Square", BLUE)
-    assert domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 10.0)
+    assert they_match(domain, writer, reader)
     return domain, writer, reader
+
+
+def they_match(domain: Domain, writer: NodeWriter, reader: NodeReader) -> bool:
+    return domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 5.0)
+
+
+def samples_flow(domain: Domain, writer: NodeWriter, reader: NodeReader) -> bool:
+    before = len(reader.taken)
+    writer.write()
+    return domain.run_until(lambda: len(reader.taken) == before + 1, 5.0)
 
 
 def test_an_allowed_partition_changes_and_samples_go_on(identities: list[Properties]) -> None:
     domain, writer, reader = matched(identities)
     writer.change(ANY_BLUE)
     domain.run(1.0)
-    writer.write()
-    assert domain.run_until(lambda: len(reader.taken) == 1, 2.0)
+    assert samples_flow(domain, writer, reader)
 
 
 def test_who_parts_by_a_partition_and_meets_again_has_new_keys(identities: list[Properties]) -> None:
@@ -75,9 +85,8 @@ def test_who_parts_by_a_partition_and_meets_again_has_new_keys(identities: list[
     domain.run(1.0)
     assert (writer.matched_count, reader.matched_count) == (0, 0)
     reader.change(ANY_BLUE)
-    assert domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 5.0)
-    writer.write()
-    assert domain.run_until(lambda: len(reader.taken) == 1, 5.0)
+    assert they_match(domain, writer, reader)
+    assert samples_flow(domain, writer, reader)
 
 
 def test_an_owner_is_refused_a_partition_that_its_permissions_do_not_name(identities: list[Properties]) -> None:
@@ -91,7 +100,7 @@ def test_an_owner_is_refused_a_partition_that_its_permissions_do_not_name(identi
     assert (writer.matched_count, reader.matched_count) == (1, 1)
 
 
-@pytest.mark.parametrize("who", ["writer", "reader"])
+@either
 def test_a_peer_that_changes_to_it_all_the_same_is_unmatched(
     identities: list[Properties], monkeypatch: pytest.MonkeyPatch, who: str
 ) -> None:
@@ -114,14 +123,8 @@ def do_as_you_like(node: Node, endpoint: NodeWriter | NodeReader, monkeypatch: p
     monkeypatch.setattr(node.engine.hooks, "local_endpoint_changed", lambda data: protection)
 
 
-def samples_flow(domain: Domain, writer: NodeWriter, reader: NodeReader) -> bool:
-    before = len(reader.taken)
-    writer.write()
-    return domain.run_until(lambda: len(reader.taken) == before + 1, 5.0)
-
-
-@pytest.mark.parametrize("governance", GOVERNANCES)
-@pytest.mark.parametrize("who", ["writer", "reader"])
+@every_governance
+@either
 def test_a_peer_that_was_unmatched_alone_and_corrects_itself_matches_again(
     identities_of: Identities, monkeypatch: pytest.MonkeyPatch, governance: str, who: str
 ) -> None:
@@ -138,13 +141,13 @@ def test_a_peer_that_was_unmatched_alone_and_corrects_itself_matches_again(
         domain.run(1.0)
         assert len(reader.taken) == seen
         wrongdoer.change(BLUE)
-        assert domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 5.0)
+        assert they_match(domain, writer, reader)
         domain.run(2.0)
         assert samples_flow(domain, writer, reader)
 
 
-@pytest.mark.parametrize("governance", GOVERNANCES)
-@pytest.mark.parametrize("who", ["writer", "reader"])
+@every_governance
+@either
 def test_who_throws_keys_away_as_it_parts_matches_again(
     identities_of: Identities, monkeypatch: pytest.MonkeyPatch, governance: str, who: str
 ) -> None:
@@ -158,5 +161,5 @@ def test_who_throws_keys_away_as_it_parts_matches_again(
     forgetful.change(BLUE)
     assert (forgetful.matched_count, other.matched_count) == (governance in KEYLESS[who], 1)
     domain.network.heal()
-    assert domain.run_until(lambda: writer.matched_count == reader.matched_count == 1, 5.0)
+    assert they_match(domain, writer, reader)
     assert samples_flow(domain, writer, reader)
