@@ -57,6 +57,8 @@ _WORK_OF_A_FRAGMENTED_SAMPLE = 256
 _UNKNOWN_PREFIX = bytes(12)
 # INFO_REPLY is understood and not acted upon: answers go to the locators that the participant announced.
 _WITHOUT_EFFECT = frozenset({SubmessageKind.PAD, SubmessageKind.INFO_REPLY, SubmessageKind.INFO_REPLY_IP4})
+_LE_AND_QOS = 0x03
+_DATA_FRAG_FIXED = 32  # octets of its body before an inline QoS
 _KEY_HASH_QOS = 24  # octets of an inline QoS that holds a key hash alone
 _CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
 
@@ -472,7 +474,9 @@ class Inbound:
         """One run of fragments: decoded and joined once, whoever reads it."""
         if not incoming.is_for_us:
             return
-        data = DataFrag.decode(raw.flags, raw.body)
+        flags, body = raw.flags, raw.body
+        key_hash = key_hash_alone(body, 0, len(body), _DATA_FRAG_FIXED) if flags & 3 == _LE_AND_QOS else b""
+        data = DataFrag.decode(flags, body, inline_qos_octets=_KEY_HASH_QOS if key_hash else 0)
         _check_number(data.writer_sn, raw)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
@@ -495,14 +499,23 @@ class Inbound:
             return
         # Protection makes a run longer than padding does.  One that was not made longer is part of a sample that was
         # protected as a whole (OpenDDS): it cannot be opened before the last fragment is here.
-        is_sealed = is_protected and len(data.serialized_payload) < data.run_length + 4
+        run_length = data.run_length
+        is_sealed = is_protected and len(data.serialized_payload) < run_length + 4
         fragments: Octets | Outcome = data.serialized_payload
         if not is_sealed:
             fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload)
         if isinstance(fragments, Outcome):
             self.undecodable(fragments, incoming.source)
             return
-        self._add_fragments(incoming, remote, data, memoryview(fragments), is_sealed=is_sealed)
+        if len(fragments) < run_length:
+            raise MalformedMessage(f"{len(fragments)} octets of {run_length}", element="DATA_FRAG")
+        # Read at once: it lies in a buffer that holds something else when the last fragment comes.
+        inline: InlineQos | None = None
+        if key_hash:
+            inline = InlineQos(key_hash=key_hash)
+        elif data.inline_qos is not None:
+            inline = InlineQos.read(data.inline_qos)
+        self._add_fragments(incoming, remote, data, memoryview(fragments), inline, is_sealed=is_sealed)
 
     def _not_cdr(self, incoming: Incoming, remote: RemoteWriter, data: Data | DataFrag) -> None:
         """Flag N.  RTPS 2.5 §8.3.8.2: only who has agreed on such a payload can read it."""
@@ -518,12 +531,15 @@ class Inbound:
         return wanted
 
     def _add_fragments(
-        self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, fragments: memoryview, *, is_sealed: bool
+        self,
+        incoming: Incoming,
+        remote: RemoteWriter,
+        data: DataFrag,
+        fragments: memoryview,
+        inline: InlineQos | None,
+        *,
+        is_sealed: bool,
     ) -> None:
-        if len(fragments) < data.run_length:
-            raise MalformedMessage(f"{len(fragments)} octets of {data.run_length}", element="DATA_FRAG")
-        # Read at once: it lies in a buffer that holds something else when the last fragment comes.
-        inline = InlineQos.read(data.inline_qos) if data.inline_qos is not None else None
         defragmenter = remote.defragmenter
         dropped = defragmenter.dropped
         sample = defragmenter.add(

@@ -110,7 +110,7 @@ class Outbound:
         behavior = writer.behavior
         if not behavior.locators:
             return
-        if change.kind is not ChangeKind.ALIVE or change.related is not None or change.coherence is not None:
+        if not _is_usual(change, None):
             self._send_data(writer, change, None)
             return
         payload = self._hooks.encode_payload(writer.guid, change.payload)
@@ -176,17 +176,31 @@ class Outbound:
             octets = memoryview(change.payload)[(number - 1) * size : number * size]
             payload = self._hooks.encode_payload(writer.guid, octets)
         padding = _PADDING[len(payload) & 3]
-        head = DataFrag(
-            reader.entity_id if reader is not None else EntityId.UNKNOWN,
-            writer.guid.entity_id,
-            change.sequence_number,
-            number,
-            count,
-            size,
-            sample_size,
-            _inline_qos(change, reader) if number == 1 else None,
-            is_key=change.kind is not ChangeKind.ALIVE,
-        ).encode_head(len(payload) + len(padding))
+        payload_octets = len(payload) + len(padding)
+        if _is_usual(change, reader):
+            head = fast.data_frag_head(
+                reader.guid[12:] if reader is not None else _UNKNOWN_ID,
+                writer.guid[12:],
+                change.sequence_number,
+                number,
+                count,
+                size,
+                sample_size,
+                change.key_hash if number == 1 else b"",
+                payload_octets,
+            )
+        else:
+            head = DataFrag(
+                reader.entity_id if reader is not None else EntityId.UNKNOWN,
+                writer.guid.entity_id,
+                change.sequence_number,
+                number,
+                count,
+                size,
+                sample_size,
+                _inline_qos(change, reader) if number == 1 else None,
+                is_key=change.kind is not ChangeKind.ALIVE,
+            ).encode_head(payload_octets)
         self._append(writer, reader, (head, payload, padding), change.source_timestamp)
 
     def _send_heartbeat(self, writer: LocalWriter, item: SendHeartbeat) -> None:
@@ -337,6 +351,17 @@ def _key_payload(payload: Octets) -> Octets:
     return payload if not 0 < len(payload) <= _KEY_HASH_OCTETS else bytes(payload).ljust(_KEY_HASH_OCTETS + 4, b"\0")
 
 
+def _is_usual(change: CacheChange, reader: ReaderProxy | None) -> bool:
+    """Is it a sample, beside which nothing has to travel but a key hash, if that?"""
+    return (
+        change.kind is ChangeKind.ALIVE
+        and change.related is None
+        and change.original is None
+        and change.coherence is None
+        and (reader is None or reader.content_filter is None)
+    )
+
+
 def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterList | None:
     """What must travel beside the payload: which end this is, and whose; and what the sample answers.
 
@@ -344,12 +369,10 @@ def _inline_qos(change: CacheChange, reader: ReaderProxy | None) -> ParameterLis
     (Fast DDS), some the other (Cyclone DDS).  With samples it goes where their key is protected.  A reader whose
     content filter was evaluated here need not do it again.
     """
+    if not change.key_hash and _is_usual(change, reader):
+        return None
     content_filter = reader.content_filter if reader is not None and change.kind is ChangeKind.ALIVE else None
     coherence = change.coherence
-    identities = change.related is not None or change.original is not None
-    is_plain = not (identities or change.key_hash) and content_filter is None and coherence is None
-    if change.kind is ChangeKind.ALIVE and is_plain:
-        return None
     parameters = ParameterList(little_endian=True)
     if content_filter is not None:
         verdicts = {content_filter.signature: True}

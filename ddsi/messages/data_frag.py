@@ -129,8 +129,10 @@ class DataFrag:
         return head + qos
 
     @classmethod
-    def decode(cls, flags: int, body: Octets) -> DataFrag:
+    def decode(cls, flags: int, body: Octets, *, inline_qos_octets: int = 0) -> DataFrag:
         """The payload is a view of ``body``.  RTPS 2.5 §8.3.8.3.3.
+
+        ``inline_qos_octets``: of an inline QoS that was read already, and is left out; 0 where it was not.
 
         Malformed: a number below 1, a run that begins or ends beyond the sample, a run that is not all there.
         """
@@ -143,16 +145,22 @@ class DataFrag:
         if to_inline_qos % 4 or not _BODY_LENGTH <= rest <= len(view):
             reason = f"octetsToInlineQos is {to_inline_qos}, {len(view) - _TO_INLINE_QOS_END} octets are left"
             raise _malformed(reason, _TO_INLINE_QOS_END)
-        if min(writer_sn, starting_num, count, size) < 1:
+        if writer_sn < 1 or not (starting_num and count and size):
             raise _malformed(f"no change {writer_sn} has {count} fragments of {size} octets from {starting_num} on")
         if (starting_num + count - 2) * size >= sample_size:
             raise _malformed(f"fragment {starting_num + count - 1} of {size} octets is beyond {sample_size}")
         inline_qos = None
-        if flags & _INLINE_QOS:
+        if inline_qos_octets:
+            rest += inline_qos_octets
+        elif flags & _INLINE_QOS:
             inline_qos, length = ParameterList.decode(view, little_endian=little_endian, start=rest)
             rest += length
+        end = (starting_num + count - 1) * size
+        run_length = (end if end < sample_size else sample_size) - (starting_num - 1) * size
         payload = view[rest:]
-        data_frag = cls(
+        if len(payload) < run_length:
+            raise _malformed(f"{len(payload)} octets of {run_length} are there", rest)
+        return cls(
             EntityId(reader_id),
             EntityId(writer_id),
             writer_sn,
@@ -165,9 +173,6 @@ class DataFrag:
             bool(flags & _KEY),
             bool(flags & _NON_STANDARD_PAYLOAD),
         )
-        if len(payload) < data_frag.run_length:
-            raise _malformed(f"{len(payload)} octets of {data_frag.run_length} are there", rest)
-        return data_frag
 
 
 def _malformed(reason: str, offset: int = _BODY_LENGTH) -> MalformedMessage:

@@ -14,6 +14,7 @@ from .raw_submessage import SubmessageKind
 __all__ = [
     "DATA_BODY",
     "SUBMESSAGE_HEAD",
+    "data_frag_head",
     "data_head",
     "data_head_with_key_hash",
     "envelope_end",
@@ -24,6 +25,7 @@ __all__ = [
 
 _TIMESTAMP = struct.Struct("<BBHII")
 _DATA_HEAD = struct.Struct("<BBHHH4s4siI")
+_DATA_FRAG_HEAD = struct.Struct("<BBHHH4s4siIIHHI")
 _DATA_HEAD_WITH_KEY_HASH = struct.Struct("<BBHHH4s4siIHH16sI")
 _KEY_HASH_QOS = struct.Struct("<HH16sI")
 _KEY_HASH, _SENTINEL = 0x0070, 0x0001
@@ -60,11 +62,27 @@ def data_head_with_key_hash(
     )  # fmt: skip
 
 
-def key_hash_alone(octets: Octets, start: int, end: int) -> bytes:
-    """The key hash in the inline QoS of the DATA body at ``octets[start:end]``; empty if that holds anything else."""
-    if end - start < 44 or octets[start + 2] != 16 or octets[start + 3]:
+def data_frag_head(
+    reader_id: bytes, writer_id: bytes, sequence_number: int, first: int, count: int, fragment_size: int,
+    sample_size: int, key_hash: bytes, payload_octets: int,
+) -> bytes:  # fmt: skip
+    """The 36 octets of a DATA_FRAG before its payload, and 24 of an inline QoS that holds ``key_hash`` if it is not
+    empty."""
+    qos = _KEY_HASH_QOS.pack(_KEY_HASH, 16, key_hash, _SENTINEL) if key_hash else b""
+    return _DATA_FRAG_HEAD.pack(
+        0x16, 0x03 if key_hash else 0x01, 32 + len(qos) + payload_octets, 0, 28, reader_id, writer_id,
+        sequence_number >> 32, sequence_number & 0xFFFFFFFF, first, count, fragment_size, sample_size,
+    ) + qos  # fmt: skip
+
+
+def key_hash_alone(octets: Octets, start: int, end: int, fixed: int = 20) -> bytes:
+    """The key hash in the inline QoS of the body at ``octets[start:end]``; empty if that holds anything else.
+
+    ``fixed``: octets of the body before its inline QoS, as a rule: 20 in DATA, 32 in DATA_FRAG.
+    """
+    if end - start < fixed + 24 or octets[start + 2] != fixed - 4 or octets[start + 3]:
         return b""
-    parameter, length, key_hash, sentinel = _KEY_HASH_QOS.unpack_from(octets, start + 20)
+    parameter, length, key_hash, sentinel = _KEY_HASH_QOS.unpack_from(octets, start + fixed)
     return key_hash if parameter == _KEY_HASH and length == 16 and sentinel == _SENTINEL else b""
 
 

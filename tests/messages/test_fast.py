@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -68,6 +70,22 @@ def test_a_key_hash_is_found_only_where_it_is_alone(parameters: list[int], lengt
     octets = Data(EntityId.UNKNOWN, EntityId.UNKNOWN, 1, inline_qos, b"payload.").encode()
     is_alone = parameters == [ParameterId.KEY_HASH] and 12 < length <= 16  # a parameter is padded to a multiple of 4
     assert fast.key_hash_alone(octets, 4, len(octets)) == (bytes(range(length)).ljust(16, b"\0") if is_alone else b"")
+
+
+@given(entity_ids, entity_ids, sequence_numbers, words, words, st.just(b"") | st.binary(min_size=16, max_size=16))
+def test_fragments_with_and_without_a_key_hash(
+    reader_id: EntityId, writer_id: EntityId, writer_sn: int, first: int, count: int, key_hash: bytes
+) -> None:
+    run, sample_size = bytes(range(8 * count)), 8 * (first + count)
+    head = fast.data_frag_head(reader_id, writer_id, writer_sn, first, count, 8, sample_size, key_hash, len(run))
+    octets = head + run
+    inline_qos = ParameterList([(ParameterId.KEY_HASH, key_hash)]) if key_hash else None
+    general = DataFrag(reader_id, writer_id, writer_sn, first, count, 8, sample_size, inline_qos, run)
+    assert octets == general.encode()
+    assert fast.key_hash_alone(octets, 4, len(octets), 32) == key_hash
+    if key_hash:
+        found = DataFrag.decode(octets[1], octets[4:], inline_qos_octets=24)
+        assert found == replace(general, inline_qos=None)
 
 
 submessages = st.builds(
