@@ -71,6 +71,28 @@ async def test_a_writer_leaves_a_partition_and_comes_back_by_a_wildcard(reader: 
 
 
 @pytest.mark.peers
+@pytest.mark.parametrize("peer", [CYCLONE_C, FAST_DDS], ids=["cyclone", "fastdds"])
+@async_test
+async def test_a_reader_that_meets_a_writer_again_has_its_history_once(peer: Peer) -> None:
+    """Fast DDS sends all of it again.  Cyclone DDS has noticed nothing, and repeats what it is asked for."""
+    peer.locate()
+    with namespace() as host:
+        async with scenario("history that is known", deadline=90) as stage:
+            reader = await changing(stage, host, "reader", "ddsi_changing", "sub", DOMAIN, "blue", "--lasting")
+            await peer.start(stage, "pub", Options(domain=int(DOMAIN), partitions=("blue",), count=3), host=host)
+            for number in range(3):
+                await reader.expect(rf"SAMPLE {number} .*", timeout=STEP_S)
+            for _ in range(2):
+                await change(reader, "partition red")
+                await matched(reader, count=0)
+                await trio.sleep(0.5)
+                await change(reader, "partition blue")
+                await matched(reader)
+                await trio.sleep(2)
+            assert len(reader.matches("SAMPLE .*")) == 3
+
+
+@pytest.mark.peers
 @pytest.mark.parametrize("governance", ["metadata-data", "data", "all-origin"])
 @pytest.mark.parametrize("peer", [CYCLONE_C, FAST_DDS], ids=["cyclone", "fastdds"])
 @async_test

@@ -1,6 +1,6 @@
 """Our writer or reader whose policies change as lines on standard input say.
 
-    ddsi_changing pub|sub DOMAIN PARTITION [--exclusive] [--secure GOVERNANCE FOLDER]
+    ddsi_changing pub|sub DOMAIN PARTITION [--exclusive] [--lasting] [--secure GOVERNANCE FOLDER]
 
 Lines: ``partition NAME...``, ``strength N``, ``deadline SECONDS``, ``write NUMBER``, ``end``.  It says MATCHED with how
 many are matched whenever that changes, CHANGED or REFUSED after a change, SAMPLE, and INCOMPATIBLE with the policy.
@@ -76,6 +76,8 @@ async def main() -> None:
     qos = ddsi.Qos(reliability=ddsi.Reliable(max_blocking_time=10), history=ddsi.KeepAll())
     if "--exclusive" in flags:
         qos |= ddsi.Qos(ownership=ddsi.Exclusive())
+    if "--lasting" in flags:
+        qos |= ddsi.Qos(durability=ddsi.TransientLocal())
     async with ddsi.DomainParticipant(int(domain), qos=secured(flags)) as participant, trio.open_nursery() as nursery:
         topic = ddsi.Topic(participant, "Square", ShapeType)
         entity: Any
