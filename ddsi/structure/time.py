@@ -80,9 +80,12 @@ def duration_to_wire(seconds: float) -> tuple[int, int]:
     if seconds >= _INFINITE_SECONDS:
         return _INFINITE_SECONDS, _INFINITE_FRACTION
     whole = math.floor(seconds)
-    # The nearest tick, so that 0.1 read back is 0.1; a fraction that rounds up to one carries over.
-    fraction = round((seconds - whole) * TICKS_PER_SECOND)
-    return (whole, fraction) if fraction < TICKS_PER_SECOND else (whole + 1, 0)
+    nanoseconds = round((seconds - whole) * _NANOSECONDS)
+    if nanoseconds == _NANOSECONDS:
+        return whole + 1, 0
+    # The next tick up, as Cyclone DDS and Fast DDS do.  Fast DDS rounds down to nanoseconds as it reads: told the tick
+    # below, it takes our 0.7 for less than its own 0.7, and does not match a reader that asks for it.
+    return whole, -(-nanoseconds * TICKS_PER_SECOND // _NANOSECONDS)
 
 
 def duration_from_wire(seconds: int, fraction: int) -> float:

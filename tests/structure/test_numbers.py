@@ -27,6 +27,7 @@ from ddsi.structure.time import (
         (1, (1, 0)),
         (0.5, (0, 0x80000000)),
         (0.1, (0, 0x1999999A)),
+        (0.7, (0, 0xB3333334)),  # up: who rounds down to nanoseconds as he reads, as Fast DDS does, must not find less
         (1.25, (1, 0x40000000)),
         (0.999999999999, (1, 0)),  # rounds up, and carries
         (math.inf, (0x7FFFFFFF, 0xFFFFFFFF)),
@@ -43,6 +44,12 @@ def test_durations_come_back_as_people_wrote_them(seconds: int, nanoseconds: int
     duration = round(seconds + nanoseconds / 10**9, 6)
     assert duration_from_wire(*duration_to_wire(duration)) == pytest.approx(duration, abs=1e-9)
     assert duration_from_wire(*duration_to_wire(seconds / 1000)) == seconds / 1000
+
+
+@given(st.integers(0, 999_999_999))
+def test_who_rounds_down_to_nanoseconds_reads_what_was_written(nanoseconds: int) -> None:
+    whole, fraction = duration_to_wire(5 + nanoseconds / 10**9)
+    assert (whole, fraction * 10**9 >> 32) == (5, nanoseconds)
 
 
 @pytest.mark.parametrize("fraction", [0xFFFFFFFF, 0x7FFFFFFF, 0])
