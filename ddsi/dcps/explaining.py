@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..discovery.explanation import Explanation, PairExplanation
+from ..discovery.explanation import Explanation, PairExplanation, fits
 from ..engine import Participant
 from ..engine.explaining import explain, explain_endpoints, explain_pairs
 from ..structure.errors import BadParameter
 from ..structure.guid import Guid
+from .endpoint import Endpoint
+from .entity import Parent
 
 if TYPE_CHECKING:
     from .participant import DomainParticipant
@@ -16,8 +20,28 @@ if TYPE_CHECKING:
 __all__ = ["explain_all", "pairs_seen"]
 
 
-def explain_all(engine: Participant, asked: tuple[str | Guid, ...], now: float) -> Explanation:
+def explain_all(participant: DomainParticipant, asked: tuple[str | Guid, ...]) -> Explanation:
     """See ``DomainParticipant.explain``."""
+    pump = participant._running_pump()
+    explanation = _explain(pump.engine, asked, pump.now())
+    pump.settle()  # questions about types
+    return replace(explanation, unused=tuple(_unused(participant, asked)))
+
+
+def _unused(parent: Parent, asked: tuple[str | Guid, ...]) -> Iterator[tuple[Guid, tuple[str, ...]]]:
+    """The endpoints asked about that were given policies in vain, and the names of these."""
+    for member in parent.contained_entities():
+        if isinstance(member, Parent):
+            yield from _unused(member, asked)
+        elif isinstance(member, Endpoint) and member.unused_policies:
+            guid = member._local().guid
+            if not asked or any(
+                one == guid if isinstance(one, Guid) else fits(one, member.topic.name) for one in asked
+            ):
+                yield guid, member.unused_policies
+
+
+def _explain(engine: Participant, asked: tuple[str | Guid, ...], now: float) -> Explanation:
     guids = tuple(one for one in asked if isinstance(one, Guid))
     names = [one for one in asked if isinstance(one, str)]
     if len(guids) + len(names) < len(asked) or (guids and names) or len(names) > 1:

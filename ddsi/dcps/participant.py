@@ -309,10 +309,7 @@ class DomainParticipant(Parent):
 
         Raises BadParameter for a mixture, for two names, and for Guids that are all of writers or all of readers.
         """
-        pump = self._running_pump()
-        explanation = explain_all(pump.engine, asked, pump.now())
-        pump.settle()  # questions about types
-        return explanation
+        return explain_all(self, asked)
 
     def drop_counts(self) -> Counter[str]:
         """How many datagrams, submessages and announcements were not acted upon, by reason."""

@@ -87,6 +87,7 @@ class Explanation:
     """``asked``: a pattern of topics, or Guids as text; empty for everything.  ``unknown``: Guids nobody announces.
 
     ``left_out``: how many pairs there are beyond the 100,000 that were looked at, and of which nothing is said.
+    ``unused``: those endpoints of the participant itself that were given policies in vain, and the names of these.
     """
 
     asked: tuple[str, ...]
@@ -95,6 +96,7 @@ class Explanation:
     troubles: tuple[ParticipantTrouble, ...] = ()
     unknown: tuple[Guid, ...] = ()
     left_out: int = 0
+    unused: tuple[tuple[Guid, tuple[str, ...]], ...] = ()
 
     @property
     def mismatches(self) -> tuple[PairExplanation, ...]:

@@ -40,6 +40,21 @@ async def test_an_application_learns_everything_that_stands_between(domain: int)
 
 
 @in_trio
+async def test_policies_that_mean_nothing_to_an_endpoint_of_ours_are_named(domain: int) -> None:
+    shared = ddsi.Qos(lifespan=ddsi.Lifespan(1), time_based_filter=ddsi.TimeBasedFilter(0.1))
+    async with ddsi.DomainParticipant(domain) as here:
+        square, circle = (ddsi.Topic(here, name, Shape) for name in ("Square", "Circle"))
+        writer = ddsi.DataWriter(ddsi.Publisher(here), square, shared)
+        reader = ddsi.DataReader(here, circle, shared)
+        ddsi.DataReader(here, square)
+        assert dict(here.explain().unused) == {writer.guid: ("time_based_filter",), reader.guid: ("lifespan",)}
+        assert (
+            here.explain("Squ*").unused == here.explain(writer.guid).unused == ((writer.guid, ("time_based_filter",)),)
+        )
+        assert here.explain("Triangle").unused == ()
+
+
+@in_trio
 async def test_two_guids_are_compared_whatever_their_topics_are(domain: int) -> None:
     async with ddsi.DomainParticipant(domain) as here:
         writer = ddsi.DataWriter(here, ddsi.Topic(here, "Square", Shape))
