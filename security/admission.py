@@ -26,7 +26,7 @@ from .announced import info, participant_refusal, token, vouched
 from .authentication_plugin import Authentication, AuthStatusKind, RemoteIdentity
 from .generic_message import GenericMessage
 from .handles import HandshakeHandle, IdentityHandle, Pending, PermissionsHandle, SharedSecretHandle
-from .handshake import Authenticated, Failed, Handshake, Output, Reported, Send, State, Work
+from .handshake import Authenticated, Complete, Failed, Handshake, Output, Reported, Send, State, Work
 from .key_exchange import KeyExchange
 from .loading import Plugins
 from .logging_plugin import LogLevel
@@ -284,6 +284,8 @@ class AdmissionDesk:
             match output:
                 case Send():
                     self._mailbox.post_handshake(remote, output)
+                case Complete(send):
+                    self._mailbox.complete_handshake(remote, send)
                 case Work(job):
                     self._compute(remote, job, lambda result, now: self._worked(remote, handshake, result, now))
                 case Authenticated(handle):
@@ -449,7 +451,7 @@ class AdmissionDesk:
         for handshake in (remote.handshake, remote.renewal):
             if handshake is not None:
                 handshake.close()
-        remote.handshake = remote.renewal = remote.said = None
+        remote.handshake = remote.renewal = remote.said = remote.posted = None
         self._room.leave(remote.guid)
 
     def _return_credentials(self, remote: RemoteParticipant) -> None:

@@ -5,6 +5,10 @@ the messages loses, repeats and reorders them, and anybody can write to it.  Fro
 
 * whoever waits says again what it said last, unchanged, ever more slowly (:data:`RESEND_FIRST_S` to
   :data:`RESEND_LAST_S`);
+* these messages are large, and best effort repairs no fragments.  So halfway to each repetition the fragments are sent
+  again under the number that they had, and those that came of both times make up one message (:class:`Complete`).  The
+  repetition itself has a new number, since some readers (Fast DDS) pass on no number twice, and its receiver may need
+  to hear it again.  Who has said nothing yet is sent no fragments twice: it may be a victim of whoever announced it;
 * a repeated request gets the same reply again and a repeated reply the same final, also when all is done;
 * the final is said again until the peer shows that it has the secret (:meth:`Handshake.confirm`): nothing answers it;
 * a message that does not verify changes nothing: its reason is reported, and for a moment nothing more is looked at,
@@ -44,6 +48,7 @@ __all__ = [
     "TRANSITIONS",
     "Action",
     "Authenticated",
+    "Complete",
     "Event",
     "Failed",
     "Handshake",
@@ -97,6 +102,7 @@ class Event(Enum):
     REPLY_AGAIN = "the reply that we verified came again"
     FINAL = "a final came"
     TIMEOUT = "the timer of this state"
+    HALF_TIME = "half of the time until the last message will be said again"
     LIMIT = "the attempt takes too long"
 
 
@@ -104,6 +110,7 @@ class Action(Enum):
     WAIT = "set the timer"
     SEND = "send the message, and set the timer"
     RESEND = "send the last message again, and set a longer timer"
+    COMPLETE = "send the fragments of the last message again, as parts of the same"
     MAKE_REQUEST = "let the plugin make a request"
     MAKE_REPLY = "let the plugin make a reply"
     VERIFY = "let the plugin verify the message"
@@ -126,12 +133,14 @@ TRANSITIONS: Final[dict[tuple[State, Event], tuple[Action, State]]] = {
     (_S.REQUESTING, _E.READY): (_A.SEND, _S.AWAIT_REPLY),
     (_S.REQUESTING, _E.REFUSED): (_A.GIVE_UP, _S.FAILED),
     (_S.AWAIT_REPLY, _E.TIMEOUT): (_A.RESEND, _S.AWAIT_REPLY),
+    (_S.AWAIT_REPLY, _E.HALF_TIME): (_A.COMPLETE, _S.AWAIT_REPLY),
     (_S.AWAIT_REPLY, _E.REPLY): (_A.VERIFY, _S.VERIFYING_REPLY),
     (_S.AWAIT_REPLY, _E.LIMIT): (_A.GIVE_UP, _S.FAILED),
     (_S.VERIFYING_REPLY, _E.READY): (_A.FINISH, _S.AUTHENTICATED),
     (_S.VERIFYING_REPLY, _E.REFUSED): (_A.REPORT, _S.AWAIT_REPLY),
     (_S.AUTHENTICATED, _E.REPLY_AGAIN): (_A.RESEND, _S.AUTHENTICATED),
     (_S.AUTHENTICATED, _E.TIMEOUT): (_A.RESEND, _S.AUTHENTICATED),
+    (_S.AUTHENTICATED, _E.HALF_TIME): (_A.COMPLETE, _S.AUTHENTICATED),
     # the replier
     (_S.AWAIT_REQUEST, _E.TIMEOUT): (_A.RESEND, _S.AWAIT_REQUEST),
     (_S.AWAIT_REQUEST, _E.REQUEST): (_A.MAKE_REPLY, _S.REPLYING),
@@ -139,6 +148,7 @@ TRANSITIONS: Final[dict[tuple[State, Event], tuple[Action, State]]] = {
     (_S.REPLYING, _E.READY): (_A.SEND, _S.AWAIT_FINAL),
     (_S.REPLYING, _E.REFUSED): (_A.REPORT, _S.AWAIT_REQUEST),
     (_S.AWAIT_FINAL, _E.TIMEOUT): (_A.RESEND, _S.AWAIT_FINAL),
+    (_S.AWAIT_FINAL, _E.HALF_TIME): (_A.COMPLETE, _S.AWAIT_FINAL),
     (_S.AWAIT_FINAL, _E.REQUEST_AGAIN): (_A.RESEND, _S.AWAIT_FINAL),
     (_S.AWAIT_FINAL, _E.REQUEST): (_A.MAKE_REPLY, _S.REPLYING_AGAIN),
     (_S.AWAIT_FINAL, _E.FINAL): (_A.VERIFY, _S.VERIFYING_FINAL),
@@ -175,6 +185,13 @@ class Send:
 
 
 @dataclass(frozen=True, slots=True)
+class Complete:
+    """Send the fragments of that message again under its number; nothing if it had none, or is not the last one."""
+
+    send: Send
+
+
+@dataclass(frozen=True, slots=True)
 class Work:
     """Run the job, and give its result to :meth:`Handshake.worked`."""
 
@@ -203,7 +220,7 @@ class Failed:
     retry_s: float
 
 
-Output = Send | Work | Authenticated | Reported | Failed
+Output = Send | Complete | Work | Authenticated | Reported | Failed
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,10 +253,11 @@ class Handshake:
         self.state = State.VALIDATING
         self.remote_identity: IdentityHandle | None = None
         self._out: list[Output] = []
-        self._due = math.inf
+        self._due = self._half_due = math.inf
         self._limit = math.inf
         self._resend_s = RESEND_FIRST_S
         self._finals = 0
+        self._has_spoken = False
         self._is_confirmed = False
         self._is_begun = self._is_paused = False
         self._retry_s = RETRY_FIRST_S
@@ -267,6 +285,7 @@ class Handshake:
         """A message of the peer, or of somebody who says so, on the stateless topic."""
         if len(message.message_data) != 1:
             return []
+        self._has_spoken = True
         token = message.message_data[0]
         if message.message_class_id == AUTH_REQUEST:
             self._auth_request = token
@@ -296,15 +315,18 @@ class Handshake:
         """Something came under the secret that the two share: the peer has all that it needs."""
         if self.state is State.AUTHENTICATED:
             self._is_confirmed = True
-            self._due = math.inf
+            self._due = self._half_due = math.inf
 
     def handle_timeout(self, now: float) -> list[Output]:
         if now >= self._limit and (self.state, Event.LIMIT) in TRANSITIONS:
             self._last_reason = self._last_reason or f"no {self._missing()} came within {LIMIT_S:g} s"
             self._step(Event.LIMIT, now)
         elif now >= self._due:
-            self._due = math.inf
+            self._due = self._half_due = math.inf
             self._step(Event.TIMEOUT, now)
+        elif now >= self._half_due:
+            self._half_due = math.inf
+            self._step(Event.HALF_TIME, now)
         return self._drain()
 
     def pause(self) -> None:
@@ -313,7 +335,7 @@ class Handshake:
         Of several replies that wait for their final the latest is kept: who waits should cost little.
         """
         self._is_paused = True
-        self._due = math.inf
+        self._due = self._half_due = math.inf
         if self.state is State.AWAIT_FINAL:
             for exchange in self._exchanges[:-1]:
                 self._authentication.return_handshake_handle(exchange.handle)
@@ -336,9 +358,8 @@ class Handshake:
         return self.state in (State.AUTHENTICATED, State.VERIFYING_ANOTHER)
 
     def next_deadline(self) -> float:
-        if (self.state, Event.LIMIT) in TRANSITIONS:
-            return min(self._due, self._limit)
-        return self._due
+        due = min(self._due, self._half_due)
+        return min(due, self._limit) if (self.state, Event.LIMIT) in TRANSITIONS else due
 
     def close(self) -> None:
         """The peer is gone: whatever the plugin holds of it is returned."""
@@ -366,6 +387,9 @@ class Handshake:
             case Action.RESEND:
                 self._resend_s = min(2 * self._resend_s, RESEND_LAST_S)
                 self._send(now)
+            case Action.COMPLETE:
+                if self._last_sent is not None:
+                    self._out.append(Complete(self._last_sent))
             case Action.MAKE_REQUEST:
                 self._make_request(now)
             case Action.MAKE_REPLY:
@@ -460,7 +484,7 @@ class Handshake:
         self._message = None
 
     def _finish(self, now: float) -> None:
-        self._due = self._limit = math.inf
+        self._due = self._half_due = self._limit = math.inf
         self._resend_s = RESEND_FIRST_S
         if self._last_sent is not None:
             self._send(now)
@@ -502,7 +526,10 @@ class Handshake:
     def _set_resend(self, now: float) -> None:
         if self._is_paused and not self.is_done:
             return
-        self._due = now + self._resend_s * (1 + 0.25 * self._jitter())
+        interval = self._resend_s * (1 + 0.25 * self._jitter())
+        self._due = now + interval
+        if self._has_spoken:
+            self._half_due = now + interval / 2
 
     def _event_of(self, token: DataHolder) -> Event | None:
         """What a token is to us.  A plugin that does not mark its tokens is taken to send what is expected."""

@@ -38,7 +38,7 @@ class Mailbox:
 
     def post_handshake(self, remote: RemoteParticipant, send: Send) -> None:
         """A token of the handshake, on the stateless topic.  Sent again, it is the same message under a new number."""
-        self._post(
+        change = self._post(
             PARTICIPANT_STATELESS_MESSAGE_WRITER,
             GenericMessage(
                 message_identity=self._identity(PARTICIPANT_STATELESS_MESSAGE_WRITER),
@@ -48,6 +48,12 @@ class Mailbox:
                 message_data=(send.token,),
             ),
         )
+        remote.posted = (send, change)
+
+    def complete_handshake(self, remote: RemoteParticipant, send: Send) -> None:
+        """The same once more, for the engine to send its fragments under their number, unless another came between."""
+        if remote.posted is not None and remote.posted[0] is send:
+            self._effects.append(SendMessage(PARTICIPANT_STATELESS_MESSAGE_WRITER, remote.posted[1]))
 
     def post_keys(
         self,
@@ -75,7 +81,7 @@ class Mailbox:
         self._numbers[writer_id] += 1
         return MessageIdentity(Guid.of(self._guid.prefix, writer_id), self._numbers[writer_id])
 
-    def _post(self, writer_id: EntityId, message: GenericMessage) -> None:
+    def _post(self, writer_id: EntityId, message: GenericMessage) -> CacheChange:
         change = CacheChange(
             ChangeKind.ALIVE,
             message.message_identity.source_guid,
@@ -84,6 +90,7 @@ class Mailbox:
             destination=message.destination_participant_guid,
         )
         self._effects.append(SendMessage(writer_id, change))
+        return change
 
     # --- in ----------------------------------------------------------------------------------------------
 

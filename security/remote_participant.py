@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
+from ddsi.structure.cache_change import CacheChange
 from ddsi.structure.discovered import DiscoveredParticipantData, Parameter
 from ddsi.structure.guid import Guid
 
 from .generic_message import GenericMessage
 from .handles import ParticipantCryptoHandle, PermissionsHandle, SharedSecretHandle
-from .handshake import Handshake
+from .handshake import Handshake, Send
 
 __all__ = ["RemoteParticipant", "Standing"]
 
@@ -34,6 +35,8 @@ class RemoteParticipant:
 
     ``said``: the last handshake message of one that waits for its turn.
 
+    ``posted``: the last handshake message to it, and the change that carried it.
+
     ``vouched``: what it announced of its security, in the words that it signed.
 
     ``early``: key messages for endpoints of ours that are not matched yet, by (local, remote), oldest first.
@@ -47,6 +50,7 @@ class RemoteParticipant:
     renewal_asked: tuple[float, int] | None = None
     vouched: tuple[Parameter, ...] = ()
     said: GenericMessage | None = None
+    posted: tuple[Send, CacheChange] | None = None
     permissions: PermissionsHandle | None = None
     shared_secret: SharedSecretHandle | None = None
     crypto: ParticipantCryptoHandle | None = None

@@ -117,6 +117,16 @@ class FilteringWriter(StatefulWriter):
         self._advance_unsent()
         return out
 
+    def fragments_again(self, change: CacheChange) -> list[WriterTransmission]:
+        """All fragments of a change that was sent, under its number; nothing where it fitted into one message.
+
+        Best effort knows no NACK_FRAG.  Who got a part joins it with what comes now; who got all takes it for old, or
+        as once more the same.
+        """
+        if len(change.payload) <= change.fragment_octets:
+            return []
+        return [item for proxy in self._readers_of(change) for item in self._whole_change(change, proxy)]
+
     def piggyback_heartbeat(self) -> SendHeartbeat | None:
         return None
 

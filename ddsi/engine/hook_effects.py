@@ -77,12 +77,22 @@ class HookEffects:
             engine.hooks.computed(effect, result, now)
 
     def _send_generic_message(self, writer: LocalWriter, change: CacheChange) -> None:
-        """What the hooks have to tell another participant; one that never acknowledges is given up."""
+        """What the hooks have to tell another participant; one that never acknowledges is given up.
+
+        The change is told how it went.  Given again, its fragments go again: it is the same message, not another.
+        """
         engine, destination, behavior = self._engine, change.destination, writer.behavior
+        if change.fragment_octets and isinstance(behavior, FilteringWriter):
+            engine.writer_answers(writer, behavior.fragments_again(change))
+            return
         if isinstance(behavior, FilteringWriter) and behavior.is_given_up(destination, engine.now):
             engine.discovery.participant_lost(destination, LossReason.UNRESPONSIVE, engine.now)
             return
-        engine.write(writer, change.kind, bytes(change.payload), change.key, engine.now, destination=destination)
+        written = engine.write(
+            writer, change.kind, bytes(change.payload), change.key, engine.now, destination=destination
+        )
+        change.sequence_number, change.source_timestamp = written.sequence_number, written.source_timestamp
+        change.fragment_octets = written.fragment_octets
 
     def _publish(self, effect: Publish) -> None:
         """What the hooks have to tell everybody, with a writer of theirs on that topic."""

@@ -72,6 +72,17 @@ def test_what_has_no_destination_goes_to_everybody() -> None:
     ]  # fmt: skip
 
 
+def test_without_acknowledgments_fragments_go_again_under_their_number_and_whole_messages_do_not() -> None:
+    writer = make_writer(BEST_EFFORT)
+    match(writer, A, BEST_EFFORT)
+    match(writer, B, BEST_EFFORT)
+    small = write(writer, b"x", to=A.participant)
+    large = write(writer, bytes(3 * writer.fragment_octets), to=A.participant)
+    assert shape(writer.unsent_changes(0.0)) == ["DATA 1 to 2", "FRAG 2.1-3 to 2"]
+    assert shape(writer.fragments_again(large)) == ["FRAG 2.1-3 to 2"]
+    assert shape(writer.fragments_again(small)) == []
+
+
 def test_lst_seq_is_the_highest_number_sent_to_one_reader() -> None:
     writer = make_writer()
     a, b = match(writer, A), match(writer, B)

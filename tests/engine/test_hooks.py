@@ -38,12 +38,13 @@ from ddsi.structure.discovered import DiscoveredParticipantData, DiscoveredReade
 from ddsi.structure.errors import NotAllowedBySecurity
 from ddsi.structure.guid import Guid, GuidPrefix
 from ddsi.structure.qos import Qos, reader_qos, writer_qos
-from ddsi.structure.qos_policies import DataTags, KeepAll, Partition, Reliable, TransientLocal
+from ddsi.structure.qos_policies import BestEffort, DataTags, KeepAll, Partition, Reliable, TransientLocal
 from ddsi.structure.status import SecurityRefused
 from ddsi.trace.reasons import DropReason
 from tests.engine.wire import Stranger, engine
 
 RELIABLE = Qos(reliability=Reliable(), history=KeepAll())
+BEST_EFFORT = Qos(reliability=BestEffort(), history=KeepAll())
 
 
 class Hooks(Plaintext):
@@ -755,6 +756,37 @@ def test_a_message_of_the_hooks_goes_to_its_participant_alone() -> None:
     for node in listeners:
         (received,) = node.readers[0].taken
         assert bytes(received[1].payload[4:7]) == b"to" + node.name.encode()
+
+
+def test_a_message_given_again_is_completed_by_its_fragments_and_has_no_new_number() -> None:
+    """What of it came first and what comes now make up one sample, though nobody asks for what is missing."""
+    domain = Domain()
+    hooks = Hooks()
+    sender = domain.node(make_hooks=lambda: hooks)
+    sender.writer("keys", BEST_EFFORT, filters=True)
+    listener = domain.node()
+    reader = listener.reader("keys", BEST_EFFORT, uses_filter=True)
+    assert domain.run_until(domain.all_matched, 2)
+    fragments: list[int] = []
+
+    def loses(source: GuidPrefix, destination: GuidPrefix, octets: bytes) -> bool:
+        """Of the first three fragments the first, of the next three the last."""
+        is_fragment = len(octets) > 500
+        fragments.extend([len(fragments)] * is_fragment)
+        return is_fragment and fragments[-1] in (0, 5)
+
+    domain.network.loses = loses
+    message = _message(sender, listener, bytes(3500))
+    hooks.effects += [message]
+    sender.pump()
+    domain.run(1)
+    assert not reader.taken
+    hooks.effects += [message]
+    sender.pump()
+    domain.run(1)
+    ((_, change),) = reader.taken
+    assert len(fragments) == 6
+    assert change.sequence_number == 1
 
 
 def test_a_participant_that_never_acknowledges_is_given_up_and_nobody_else_waits() -> None:

@@ -20,6 +20,7 @@ from ddsi_security.handshake import (
     TRANSITIONS,
     Action,
     Authenticated,
+    Complete,
     Event,
     Failed,
     Handshake,
@@ -103,7 +104,7 @@ class Plugin:
 
 
 class Side:
-    """A machine with what it wants done; ``sent`` is what it wrote, ``told`` the rest."""
+    """A machine with what it wants done: ``sent``, ``completed`` (the fragments again), ``told`` (the rest)."""
 
     def __init__(self, guid: Guid, *, slow: bool = False) -> None:
         self.guid = guid
@@ -116,6 +117,7 @@ class Side:
             jitter=lambda: 0.5,
         )
         self.sent: list[GenericMessage] = []
+        self.completed: list[Send] = []
         self.told: list[Output] = []
 
     def do(self, outputs: list[Output], now: float) -> None:
@@ -131,6 +133,8 @@ class Side:
                         message_data=(output.token,),
                     )
                 )
+            elif isinstance(output, Complete):
+                self.completed.append(output.send)
             elif isinstance(output, Work):
                 self.do(self.machine.worked(output.job(), now), now)
             else:
@@ -143,10 +147,11 @@ class Side:
         self.do(self.machine.receive(message, now), now)
 
     def wait(self) -> float:
-        """To this side's next deadline."""
+        """To this side's next deadline, past those at half time."""
         now = self.machine.next_deadline()
-        self.do(self.machine.handle_timeout(now), now)
-        return now
+        outputs = self.machine.handle_timeout(now)
+        self.do(outputs, now)
+        return self.wait() if any(isinstance(output, Complete) for output in outputs) else now
 
     @property
     def is_authenticated(self) -> bool:
@@ -209,6 +214,30 @@ def test_who_waits_says_again_the_same_ever_more_slowly() -> None:
     assert [round(pause, 6) for pause in pauses] == sorted(round(pause, 6) for pause in pauses)
     assert pauses[0] < 0.2
     assert 1.0 <= pauses[-1] <= 1.25
+
+
+def test_halfway_to_each_repetition_the_fragments_are_sent_again() -> None:
+    low, high = awaiting_final()
+    sent_at, half = 0.01, high.machine.next_deadline()
+    repeated_at = high.wait()
+    assert repeated_at - half == pytest.approx(half - sent_at)
+    assert [send.token for send in high.completed] == [high.sent[-1].message_data[0]]
+    low.receive(high.sent[-1], repeated_at)
+    low.wait()
+    assert [send.token for send in low.completed] == [low.sent[-1].message_data[0]], "the final"
+    low.machine.confirm()
+    assert low.machine.next_deadline() == float("inf")
+
+
+def test_fragments_are_sent_again_only_to_who_has_said_something() -> None:
+    low, high = pair()
+    for _ in range(5):
+        low.wait()
+    assert not low.completed
+    low.receive(high.sent[0], 2.0)
+    low.wait()
+    low.wait()
+    assert {send.token for send in low.completed} == {low.sent[-1].message_data[0]}
 
 
 def test_a_repeated_request_gets_the_same_reply() -> None:
