@@ -34,10 +34,8 @@ def _unused(parent: Parent, asked: tuple[str | Guid, ...]) -> Iterator[tuple[Gui
         if isinstance(member, Parent):
             yield from _unused(member, asked)
         elif isinstance(member, Endpoint) and member.unused_policies:
-            guid = member._local().guid
-            if not asked or any(
-                one == guid if isinstance(one, Guid) else fits(one, member.topic.name) for one in asked
-            ):
+            guid, topic = member._local().guid, member.topic.name
+            if not asked or guid in asked or any(isinstance(one, str) and fits(one, topic) for one in asked):
                 yield guid, member.unused_policies
 
 

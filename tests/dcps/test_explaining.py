@@ -48,9 +48,8 @@ async def test_policies_that_mean_nothing_to_an_endpoint_of_ours_are_named(domai
         reader = ddsi.DataReader(here, circle, shared)
         ddsi.DataReader(here, square)
         assert dict(here.explain().unused) == {writer.guid: ("time_based_filter",), reader.guid: ("lifespan",)}
-        assert (
-            here.explain("Squ*").unused == here.explain(writer.guid).unused == ((writer.guid, ("time_based_filter",)),)
-        )
+        for asked in ("Squ*", writer.guid):
+            assert here.explain(asked).unused == ((writer.guid, ("time_based_filter",)),)
         assert here.explain("Triangle").unused == ()
 
 
