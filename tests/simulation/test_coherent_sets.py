@@ -16,6 +16,7 @@ from ddsi.structure.qos_policies import (
     BestEffort,
     KeepAll,
     KeepLast,
+    Partition,
     Presentation,
     Reliable,
     TransientLocal,
@@ -315,6 +316,41 @@ def test_a_network_that_was_cut_within_a_set_leaves_no_half_of_it(seed: int, sco
     view.watch(150)
     assert not any(reader.local.behavior.writers for reader in view.readers), "the lease has run out"
     scene.domain.network.heal()
+    scene.introduce()
+    scene.write_set()
+    view.watch(20)
+    assert view.flaws() == []
+    assert set(scene.sets[-1]) <= set(view.seen), "what was written since is seen"
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("scope", [TOPIC, GROUP])
+@pytest.mark.parametrize("is_local", [False, True])
+def test_who_leaves_within_a_set_and_comes_back_sees_no_half_of_it(
+    seed: int, scope: AccessScope, is_local: bool
+) -> None:
+    """By a new partition: all of the history comes once more, and of each set all is seen or nothing."""
+    scene = Scene(seed, _coherent(scope), LinkConditions(loss=0.1, jitter=0.01), durability=TransientLocal())
+    view = scene.view(scene.here if is_local else None)
+    scene.introduce()
+    scene.write_set()
+    view.watch(scene.random.choice((0.0, 0.01, 1.0)))
+
+    def move(*partitions: str) -> None:
+        for reader in view.readers:  # a partition is their subscriber's
+            reader.change(scene.qos | Qos(partition=Partition(*partitions)))
+
+    with scene.publisher.coherent_changes():
+        members = [scene.write(writer) for writer in scene.writers]
+        scene.domain.run(scene.random.choice((0.0, 0.001, 0.1)))
+        if seed % 2:
+            move("elsewhere")
+    scene.sets.append(members)
+    if not seed % 2:
+        scene.domain.run(scene.random.choice((0.0, 0.001, 0.005)))
+        move("elsewhere")
+    view.watch(1)
+    move()
     scene.introduce()
     scene.write_set()
     view.watch(20)
