@@ -22,6 +22,8 @@ from .attributes import (
     EndpointSecurityAttributesMask,
     ParticipantSecurityAttributes,
     ParticipantSecurityAttributesMask,
+    PluginEndpointSecurityAttributesMask,
+    PluginParticipantSecurityAttributesMask,
 )
 from .tokens import NIL, DataHolder, read_data_holder, write_data_holder
 
@@ -130,29 +132,34 @@ def vouched(announced: Iterable[Parameter], participant_data: bytes) -> tuple[Pa
 
 
 def participant_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:
-    return _info_refusal(ours, theirs, ParticipantSecurityAttributesMask)
+    return _info_refusal(ours, theirs, ParticipantSecurityAttributesMask, PluginParticipantSecurityAttributesMask)
 
 
 def endpoint_refusal(ours: SecurityInfo, theirs: SecurityInfo) -> str:
-    return _info_refusal(ours, theirs, EndpointSecurityAttributesMask)
+    return _info_refusal(ours, theirs, EndpointSecurityAttributesMask, PluginEndpointSecurityAttributesMask)
 
 
-def _info_refusal(ours: SecurityInfo, theirs: SecurityInfo, names: type[IntFlag]) -> str:
-    """Why two announcements do not go together; empty if they do.
+def _info_refusal(ours: SecurityInfo, theirs: SecurityInfo, names: type[IntFlag], plugin_names: type[IntFlag]) -> str:
+    """Why two announcements do not go together, by what differs; empty if they do.
 
     Each of the two masks counts only where both sides declare it valid, and must then be the same (§7.4.1.5).
     """
+    here: list[str] = []
+    there: list[str] = []
     for our_mask, their_mask, flags in (
         (ours.attributes, theirs.attributes, names),
-        (ours.plugin_attributes, theirs.plugin_attributes, None),
+        (ours.plugin_attributes, theirs.plugin_attributes, plugin_names),
     ):
-        if our_mask & their_mask & _VALID and our_mask != their_mask:
-            return f"ours has {_names(our_mask, flags)}, the peer's {_names(their_mask, flags)}"
-    return ""
+        if our_mask & their_mask & _VALID:
+            here += _names(our_mask & ~their_mask, flags)
+            there += _names(their_mask & ~our_mask, flags)
+    texts = [f"{' and '.join(here)} here, not there"] if here else []
+    texts += [f"{' and '.join(there)} there, not here"] if there else []
+    return ", ".join(texts)
 
 
-def _names(mask: int, flags: type[IntFlag] | None) -> str:
-    if flags is None:
-        return f"plugin attributes {mask & ~_VALID:#x}"
-    set_flags = [flag.name or "" for flag in flags if flag & mask & ~_VALID]
-    return " and ".join(set_flags) if set_flags else "nothing protected"
+def _names(mask: int, flags: type[IntFlag]) -> list[str]:
+    """Each set bit in words, as "submessage encrypted"; one that is not known, as plugins may have, by its value."""
+    known = {flag.value: (flag.name or "").removeprefix("IS_").replace("_", " ").lower() for flag in flags}
+    bits = [1 << place for place in range(32) if mask >> place & 1]
+    return [known.get(bit, f"attribute {bit:#x}") for bit in bits]

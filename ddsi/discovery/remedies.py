@@ -17,12 +17,15 @@ from ..structure.qos_policies import DataRepresentationId
 from ..trace.wording import seconds_text
 from .matching import MatchRefusal, incompatibilities, partitions_match
 
-__all__ = ["Disagreement", "disagreements", "security_disagreement", "topic_disagreement"]
+__all__ = ["Disagreement", "disagreements", "participant_remedy", "security_disagreement", "topic_disagreement"]
 
 _XCDR1_ONLY = (DataRepresentationId.XCDR1,)
 _VALID = 1 << 31
 _PROTECTIONS = ("read", "write", "discovery", "submessage", "payload", "key", "liveliness")
 """The bits of EndpointSecurityAttributesMask, lowest first.  DDS-Security 1.1 §8.4.2.8."""
+_WAYS = ("submessage encrypted", "payload encrypted", "origin authenticated")
+"""Those of the builtin plugins' mask.  DDS-Security 1.1 §9.4.2.5."""
+_ONE_GOVERNANCE = "give both participants one governance document, or the same rule for this"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +68,8 @@ def _all(
     for one in incompatibilities(writer, reader):
         yield Disagreement(one.policy, one.offered, one.requested, _qos_remedy(one.policy, writer, reader))
     ours, theirs = _protection(writer), _protection(reader)
-    if ours and theirs and ours != theirs:
-        remedy = "give both participants one governance document, or the same rule for this topic"
-        yield Disagreement("security", _protection_text(ours), _protection_text(theirs), remedy)
+    if ours and theirs and any(one & other & _VALID and one != other for one, other in zip(ours, theirs, strict=True)):
+        yield Disagreement("security", _protection_text(ours), _protection_text(theirs), f"{_ONE_GOVERNANCE} topic")
 
 
 # --- topics and types ------------------------------------------------------------------------------------------
@@ -130,12 +132,23 @@ def _last_part(type_name: str) -> str:
 def security_disagreement(reason: str) -> Disagreement:
     """What our own security plugins said of a pair, with the place where that is to be changed."""
     if "governance" in reason:
-        remedy = "give both participants one governance document, or the same rule for this topic"
+        remedy = f"{_ONE_GOVERNANCE} topic"
     elif "authenticated" in reason:
         remedy = "give that participant an identity (`ddsi keystore create`), or do not protect the topic in governance"
     else:
         remedy = "grant it in the permissions of the participant that is refused, and sign them anew (`ddsi explain`)"
     return Disagreement("security", reason, "", remedy)
+
+
+def participant_remedy(reason: str, *, has_identity: bool) -> str:
+    """What to do about a participant that our own security plugins did not admit."""
+    if not has_identity:
+        return "give it an identity (`ddsi keystore create`), or allow unauthenticated participants by governance"
+    if "governance protects" in reason:
+        return f"{_ONE_GOVERNANCE} domain"
+    if "permissions" in reason:
+        return "give it permissions for this domain that the permissions CA of both has signed (`ddsi explain`)"
+    return "give both identities that one CA has signed, for this domain (`ddsi keystore check`)"
 
 
 def _protection(data: DiscoveredEndpointData) -> tuple[int, int] | None:
@@ -149,8 +162,10 @@ def _protection(data: DiscoveredEndpointData) -> tuple[int, int] | None:
 
 def _protection_text(masks: tuple[int, int]) -> str:
     names = [name for bit, name in enumerate(_PROTECTIONS) if masks[0] >> bit & 1]
-    plugin = f", plugin attributes {masks[1] & ~_VALID:#x}" if masks[1] & ~_VALID else ""
-    return f"{' and '.join(names) or 'nothing'} protected{plugin}"
+    ways = [way for bit, way in enumerate(_WAYS) if masks[1] >> bit & 1]
+    if others := masks[1] & ~_VALID & ~((1 << len(_WAYS)) - 1):
+        ways.append(f"plugin attributes {others:#x}")
+    return ", ".join([f"{' and '.join(names) or 'nothing'} protected", *ways])
 
 
 # --- policies --------------------------------------------------------------------------------------------------

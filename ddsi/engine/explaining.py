@@ -22,7 +22,7 @@ from ..discovery.explanation import (
 )
 from ..discovery.matching import MatchRefusal, RefusalKind
 from ..discovery.participant_proxy import ParticipantProxy
-from ..discovery.remedies import Disagreement, disagreements, security_disagreement
+from ..discovery.remedies import Disagreement, disagreements, participant_remedy, security_disagreement
 from ..serialization.parameter_id import ParameterId
 from ..structure import builtin_entity_ids as ids
 from ..structure.discovered import DiscoveredEndpointData, DiscoveredReaderData, DiscoveredWriterData
@@ -100,9 +100,12 @@ def judged_pair(
 ) -> PairExplanation:
     """Everything that stands between the two.  ``may_ask``: others may be asked what their types are made of."""
     types = _judged_types(engine, writer, reader, now, may_ask)
+    announced = disagreements(writer, reader, types.refusal)
+    # Where governance differs the plugins refuse for that, and what is announced says it of both sides.
+    is_told = any(one.policy == "security" for one in announced)
     found = (
-        *disagreements(writer, reader, types.refusal),
-        *_security(engine, writer, reader),
+        *announced,
+        *(() if is_told else _security(engine, writer, reader)),
         *_unreachable(engine, writer, "writer"),
         *_unreachable(engine, reader, "reader"),
     )
@@ -193,11 +196,7 @@ def _troubles(engine: Participant) -> Iterator[ParticipantTrouble]:
         elif not proxy.is_admitted:
             reason = proxy.refusal or "it is not authenticated yet"
             offered = "an identity" if token else "no identity"
-            remedy = (
-                "give both identities that one CA has signed, for this domain (`ddsi keystore check`)"
-                if token
-                else "give it an identity (`ddsi keystore create`), or allow unauthenticated participants by governance"
-            )
+            remedy = participant_remedy(reason, has_identity=token)
             yield ParticipantTrouble(proxy.guid, "security", offered, reason, remedy)
         elif token and not is_secured and not knows_endpoints:
             remedy = "look with an identity that it accepts: `ddsi why --secure DIR`"

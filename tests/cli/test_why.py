@@ -10,7 +10,7 @@ from ddsi.cli import why
 from ddsi.discovery import explanation
 from ddsi.discovery.explanation import Explanation, PairExplanation, explained_pairs, lonely_topics
 from ddsi.discovery.matching import names_refusal
-from ddsi.discovery.remedies import Disagreement, disagreements
+from ddsi.discovery.remedies import Disagreement, disagreements, participant_remedy
 from ddsi.serialization.parameter_id import ParameterId
 from ddsi.structure import qos_policies as p
 from ddsi.structure.discovered import DiscoveredReaderData, DiscoveredWriterData
@@ -143,9 +143,41 @@ def test_governance_that_differs_is_told_by_what_is_protected() -> None:
     other = dataclasses.replace(reader(), security_parameters=_protected(0b11000, 1))
     (found,) = _disagreements(one, other)
     assert (found.policy, found.offered) == ("security", "submessage protected")
-    assert found.requested == "submessage and payload protected, plugin attributes 0x1"
+    assert found.requested == "submessage and payload protected, submessage encrypted"
     assert "one governance document" in found.remedy
     assert _disagreements(one, dataclasses.replace(other, security_parameters=one.security_parameters)) == ()
+
+
+@pytest.mark.parametrize(
+    ("plugin", "text"),
+    [
+        (0b110, "payload encrypted, origin authenticated"),
+        (0b101000, "plugin attributes 0x28"),  # of somebody else's plugin
+    ],
+)
+def test_how_a_plugin_protects_is_told_in_words(plugin: int, text: str) -> None:
+    one = dataclasses.replace(writer(), security_parameters=_protected(0b11000))
+    other = dataclasses.replace(reader(), security_parameters=_protected(0b11000, plugin))
+    (found,) = _disagreements(one, other)
+    assert found.requested == f"submessage and payload protected, {text}"
+
+
+@pytest.mark.parametrize(
+    ("reason", "has_identity", "remedy"),
+    [
+        (
+            "it announces no identity, and governance admits only authenticated participants",
+            False,
+            "give it an identity",
+        ),
+        ("its governance protects participants otherwise: rtps encrypted here, not there", True, "one governance"),
+        ("permissions of 'CN=bob', as received, grant 'bob': no allow rule lets it join domain 1", True, "permissions"),
+        ("the certificate of CN=bob was issued by CN=x, which is none of the identity CAs", True, "one CA has signed"),
+        ("it is not authenticated yet", True, "one CA has signed"),
+    ],
+)
+def test_the_remedy_for_a_participant_follows_from_the_reason(reason: str, has_identity: bool, remedy: str) -> None:
+    assert remedy in participant_remedy(reason, has_identity=has_identity)
 
 
 def test_what_fits_is_counted_too() -> None:

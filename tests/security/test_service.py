@@ -375,8 +375,11 @@ def test_another_governance_is_told_by_what_differs() -> None:
     alice, bob = Side("alice"), Side("bob", "governance_data")
     refusal = alice.hooks.remote_participant(bob.data, 0.0)
     assert isinstance(refusal, Refused)
-    assert "IS_RTPS_PROTECTED" in refusal.reason
-    assert "nothing protected" in refusal.reason
+    assert refusal.reason == (
+        "its governance protects participants otherwise: rtps protected and discovery protected and liveliness "
+        "protected and rtps encrypted and discovery encrypted and liveliness encrypted here, not there, and governance "
+        "admits only authenticated participants"
+    )
     assert alice.hooks.remote_participant_changed(replace(bob.data, entity_name="x"), 1.0) == refusal
 
 
