@@ -21,7 +21,7 @@ from ..serialization.parameter_id import SECURITY_PARAMETER_IDS, ParameterId, pa
 from ..serialization.parameter_list import UNDERSTOOD_PARAMETERS, ParameterList
 from ..structure.errors import BadParameter, MalformedMessage
 from ..structure.locator import Locator, LocatorKind
-from ..structure.qos_policies import BinaryProperty, Property
+from ..structure.qos_policies import BinaryProperty, Property, propagated
 from ..structure.time import DURATION_INFINITE
 from ..structure.vendor import OPENDDS, VendorId
 from .security_parameters import to_big_endian, to_little_endian
@@ -197,17 +197,10 @@ class ParameterWriter:
             self.write(pid, Writer.locator, locator)
 
     def properties(self, properties: Iterable[tuple[str, str | Property | BinaryProperty]]) -> None:
-        """PROPERTY_LIST with those that are to be propagated; nothing if there are none.
-
-        A plain str is never sent: that is how configuration, secrets among it, is given.
-        """
-        texts: list[tuple[str, str]] = []
-        octets: list[tuple[str, bytes]] = []
-        for name, value in properties:
-            if isinstance(value, Property) and value.propagate:
-                texts.append((name, value.value))
-            elif isinstance(value, BinaryProperty) and value.propagate:
-                octets.append((name, value.value))
+        """PROPERTY_LIST with those that are to be propagated; nothing if there are none."""
+        sent = list(propagated(properties))
+        texts = [(name, value.value) for name, value in sent if isinstance(value, Property)]
+        octets = [(name, value.value) for name, value in sent if isinstance(value, BinaryProperty)]
         if texts or octets:
             self.write(ParameterId.PROPERTY_LIST, _write_properties, (texts, octets))
 

@@ -51,7 +51,7 @@ from ..structure.discovered import (
 from ..structure.guid import GUID_UNKNOWN, EntityId, EntityKind, Guid, GuidPrefix
 from ..structure.locator import Locator
 from ..structure.qos import EndpointQos
-from ..structure.qos_policies import BinaryProperty, KeepAll, Properties, Property, Volatile
+from ..structure.qos_policies import KeepAll, Properties, Volatile, propagated
 from ..structure.status import Status
 from ..structure.time import ticks_from_nanoseconds
 from ..structure.vendor import PROTOCOL_VERSION
@@ -709,11 +709,6 @@ class Participant:
 
 def _own_data(setup: ParticipantSetup, guid: Guid) -> DiscoveredParticipantData:
     """What SPDP says of us; properties only where they are to be propagated."""
-    propagated: list[tuple[str, Property | BinaryProperty]] = [
-        (name, value)
-        for name, value in setup.properties.items()
-        if isinstance(value, (Property, BinaryProperty)) and value.propagate
-    ]
     return DiscoveredParticipantData(
         guid=guid,
         vendor_id=setup.config.vendor_id,
@@ -726,5 +721,5 @@ def _own_data(setup: ParticipantSetup, guid: Guid) -> DiscoveredParticipantData:
         lease_duration=setup.config.lease_duration,
         entity_name=setup.entity_name,
         user_data=setup.user_data,
-        properties=tuple(propagated),
+        properties=tuple(propagated(setup.properties.items())),
     )

@@ -9,7 +9,7 @@ Where a policy has kinds, each kind is a class (``Reliable``, ``BestEffort``) wi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from enum import IntEnum
 from typing import ClassVar
@@ -64,6 +64,7 @@ __all__ = [
     "UserData",
     "Volatile",
     "WriterDataLifecycle",
+    "propagated",
 ]
 
 LENGTH_UNLIMITED = -1
@@ -466,7 +467,7 @@ class TypeConsistency:
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """A named text; sent to other participants only if ``propagate``."""
+    """A named text; sent to other participants only if ``propagate``, and never where its name configures security."""
 
     value: str = field(repr=False)
     propagate: bool = False
@@ -474,10 +475,25 @@ class Property:
 
 @dataclass(frozen=True, slots=True)
 class BinaryProperty:
-    """Named octets; sent to other participants only if ``propagate``."""
+    """Named octets; sent as a :class:`Property` is."""
 
     value: bytes = field(repr=False)
     propagate: bool = False
 
 
 Properties = Mapping[str, str | Property | BinaryProperty]
+
+_NEVER_PROPAGATED = ("dds.sec.", "org.eclipse.cyclonedds.sec.", "com.rti.serv.secure.")
+
+
+def propagated(
+    properties: Iterable[tuple[str, str | Property | BinaryProperty]],
+) -> Iterator[tuple[str, Property | BinaryProperty]]:
+    """Those that are sent to other participants.  A plain str is not: that is how configuration is given.
+
+    What configures security (DDS-Security 1.1 §9.3.1, and what other stacks call it) is not either, whatever was said
+    of it: keys and passwords are among it.
+    """
+    for name, value in properties:
+        if isinstance(value, Property | BinaryProperty) and value.propagate and not name.startswith(_NEVER_PROPAGATED):
+            yield name, value

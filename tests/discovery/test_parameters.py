@@ -179,6 +179,26 @@ def test_only_propagated_properties_are_sent() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dds.sec.auth.password",
+        "dds.sec.auth.builtin.PKI-DH.private_key",
+        "dds.sec.crypto.keysize",
+        "org.eclipse.cyclonedds.sec.auth.crl",
+        "com.rti.serv.secure.authentication.private_key_file",
+    ],
+)
+@pytest.mark.parametrize("kind", [p.Property, p.BinaryProperty])
+def test_what_configures_security_is_not_sent_though_somebody_asks_for_it(
+    name: str, kind: type[p.Property | p.BinaryProperty]
+) -> None:
+    value = p.Property("secret", propagate=True) if kind is p.Property else p.BinaryProperty(b"secret", propagate=True)
+    octets = encode_participant(DiscoveredParticipantData(guid=PARTICIPANT, properties=((name, value),)))
+    assert b"secret" not in octets
+    assert name.encode() not in octets
+
+
 def test_participant_data_without_encapsulation_in_big_endian() -> None:
     """As the handshake of DDS Security carries it (c.pdata), the plugins' own parameters turned round too."""
     octets = participant_parameters(FULL_PARTICIPANT, little_endian=False).encode()
