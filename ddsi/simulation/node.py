@@ -284,7 +284,10 @@ class Node:
 
     def _receive(self, octets: bytes, source: Locator) -> None:
         heard = octets if self.played is None else self.played.understood(octets)
-        self.engine.receive_datagram(heard, source, self.now)
+        # As from a socket: into a buffer that holds something else soon, of which nobody may keep a part.
+        buffer = bytearray(heard)
+        self.engine.receive_datagram(memoryview(buffer), source, self.now)
+        buffer[:] = b"\xdd" * len(buffer)
         self.pump()
 
     def _arm(self) -> None:
