@@ -47,7 +47,6 @@ class CryptoTransform(Protocol):
     here.
     Decoders return the plain octets, or why there are none: not for us, no keys, rejected.  They may write into the
     octets that they are given, where these can be written to, and return parts of them: nobody reads them again.
-    What they return is read before the same decoder is called for the next one, and not after.
     """
 
     def overhead(

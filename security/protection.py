@@ -9,7 +9,6 @@ and without the former, anybody for anyone.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Final
 
 from ddsi.messages.raw_submessage import SubmessageKind
@@ -83,6 +82,7 @@ class Protection:
         self._local_endpoints = local_endpoints
         self._remotes = remotes
         self._keys = keys
+        self._payload_writers: dict[Guid, DatawriterCryptoHandle | None] = {}
         self._submessage_encoders: dict[tuple[Guid, tuple[Guid, ...]], Encoder] = {}
         """By sender and receivers."""
         self._message_encoders: dict[tuple[Guid, ...], Encoder] = {}
@@ -104,6 +104,7 @@ class Protection:
     def changed(self) -> None:
         """Endpoints or participants came or went."""
         self._required.clear()
+        self._payload_writers.clear()
         self._submessage_encoders.clear()
         self._message_encoders.clear()
         self._message_openers.clear()
@@ -124,14 +125,23 @@ class Protection:
         return Overhead(payload, submessage, message) if payload or submessage or message else NO_OVERHEAD
 
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
-        endpoint = self._local_endpoints.get(writer)
-        if endpoint is None or not endpoint.attributes.is_payload_protected:
+        try:
+            handle = self._payload_writers[writer]
+        except KeyError:
+            handle = self._payload_writers[writer] = self._payload_writer(writer)
+        if handle is None:
             return payload
-        handle = endpoint.handle
-        assert isinstance(handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
         encoded = self._cryptographic.encode_serialized_payload(bytearray(), payload, handle)
         assert not isinstance(encoded, Refused), encoded
         return encoded[0] if len(encoded) == 1 else b"".join(encoded)
+
+    def _payload_writer(self, writer: Guid) -> DatawriterCryptoHandle | None:
+        """The handle of a writer whose payloads are protected."""
+        endpoint = self._local_endpoints.get(writer)
+        if endpoint is None or not endpoint.attributes.is_payload_protected:
+            return None
+        assert isinstance(endpoint.handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
+        return endpoint.handle
 
     def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         key = (sender, receivers)
@@ -152,17 +162,11 @@ class Protection:
         readers = [handle for handle in handles if isinstance(handle, DatareaderCryptoHandle)]
         writers = [handle for handle in handles if isinstance(handle, DatawriterCryptoHandle)]
         if isinstance(handle, DatawriterCryptoHandle) and readers:
-            return partial(
-                cryptographic.encode_datawriter_submessage,
-                sending_datawriter_crypto=handle,
-                receiving_datareader_crypto_list=readers,
-            )
+            of_writer = cryptographic.encode_datawriter_submessage
+            return lambda submessage: of_writer(submessage, handle, readers)
         if isinstance(handle, DatareaderCryptoHandle) and writers:
-            return partial(
-                cryptographic.encode_datareader_submessage,
-                sending_datareader_crypto=handle,
-                receiving_datawriter_crypto_list=writers,
-            )
+            of_reader = cryptographic.encode_datareader_submessage
+            return lambda submessage: of_reader(submessage, handle, writers)
         return _refuse_it
 
     def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
@@ -182,11 +186,8 @@ class Protection:
         handles = [remote.crypto for remote in remotes if remote is not None and remote.crypto is not None]
         if not handles:
             return _refuse_it
-        return partial(
-            self._cryptographic.encode_rtps_message,
-            sending_participant_crypto=self._local_participant,
-            receiving_participant_crypto_list=handles,
-        )
+        encode, ours = self._cryptographic.encode_rtps_message, self._local_participant
+        return lambda message: encode(message, ours, handles)
 
     def _nothing(self) -> Parts:
         self.refused += 1

@@ -132,12 +132,15 @@ class SecurityService:
         self._desk.announced(parameters)
 
     def local_writer(self, data: DiscoveredWriterData) -> ProtectedEndpoint:
+        self._protection.changed()
         return self._own.writer_created(data)
 
     def local_reader(self, data: DiscoveredReaderData) -> ProtectedEndpoint:
+        self._protection.changed()
         return self._own.reader_created(data)
 
     def local_endpoint_changed(self, data: DiscoveredWriterData | DiscoveredReaderData) -> ProtectedEndpoint:
+        self._protection.changed()
         return self._own.endpoint_changed(data)
 
     def local_endpoint_deleted(self, guid: Guid) -> None:

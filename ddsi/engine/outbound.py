@@ -167,7 +167,7 @@ class Outbound:
         count, sample_size = 1, len(change.payload)
         if reader is not None and reader.guid in writer.joining_readers:
             if change.sealed is None:
-                change.sealed = bytes(self._hooks.encode_payload(writer.guid, change.payload))
+                change.sealed = self._hooks.encode_payload(writer.guid, change.payload)
             # What protection adds may make a fragment more; it goes with the last, so that all count fragments alike.
             is_last, sample_size = number * size >= sample_size, len(change.sealed)
             count = -(-sample_size // size) - number + 1 if is_last else 1

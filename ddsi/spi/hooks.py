@@ -271,11 +271,7 @@ class SecurityHooks(Protocol):
         ...
 
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
-        """Protect a SerializedPayload, or one run of fragments of it (§8.5.1.9.1).
-
-        What is returned goes into a submessage at once, and through :meth:`encode_submessage`: it is not to be kept
-        beyond the next call.
-        """
+        """Protect a SerializedPayload, or one run of fragments of it (§8.5.1.9.1)."""
         ...
 
     def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:

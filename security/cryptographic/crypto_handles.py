@@ -19,8 +19,8 @@ from ddsi.spi import Refused
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
-from .aes_gcm import Scratch
 from .received_keys import KeyRing
+from .rooms import Rooms
 from .session_keys import ReceiverKey, SendingKey
 from .transformation import Protection
 
@@ -43,8 +43,7 @@ VOLATILE_PROTECTION: Final = Protection(encrypted=True)
 class LocalParticipant(ParticipantCryptoHandle):
     """``key``: of whole messages; None where they are not protected.  ``protection`` likewise.
 
-    ``scratch``: for large plain texts, of messages, submessages and payloads, which lie within each other.
-    ``sending``: for large payloads that a protected submessage takes up as soon as they are protected.
+    ``rooms``: for large octets, plain and protected.
     """
 
     __slots__ = (
@@ -55,14 +54,12 @@ class LocalParticipant(ParticipantCryptoHandle):
         "max_blocks",
         "protection",
         "remotes",
-        "scratch",
-        "sending",
+        "rooms",
     )
 
     def __init__(self, protection: Protection | None, *, key_bits: int, max_blocks: int, first_key_id: int) -> None:
         self.protection = protection
-        self.scratch = (Scratch(), Scratch(), Scratch())
-        self.sending = Scratch()
+        self.rooms = Rooms()
         self.key_bits = key_bits
         self.max_blocks = max_blocks
         self.key: SendingKey | None = None
@@ -76,7 +73,7 @@ class LocalParticipant(ParticipantCryptoHandle):
         return self._last_key_id.to_bytes(4, "big")
 
     def wipe(self) -> None:
-        _wipe(self.key, *self.scratch)
+        _wipe(self.key, self.rooms)
         self.key = None
 
     def __repr__(self) -> str:
@@ -111,10 +108,9 @@ class RemoteParticipant(ParticipantCryptoHandle):
     ) -> None:
         self.local = local
         self.exchange_key: SendingKey | None = exchange_key
-        of_messages, of_submessages, _ = local.scratch
-        self.exchange_ring = KeyRing(wall_clock, of_submessages)
+        self.exchange_ring = KeyRing(wall_clock, local.rooms)
         self.receiver_key = receiver_key
-        self.ring = KeyRing(wall_clock, of_messages)
+        self.ring = KeyRing(wall_clock, local.rooms)
         self.endpoints: set[RemoteWriter | RemoteReader] = set()
         self.volatile_writer: RemoteWriter | None = None
         self.volatile_reader: RemoteReader | None = None
@@ -267,7 +263,7 @@ class RemoteWriter(DatawriterCryptoHandle):
         return f"<RemoteWriter {self.ring!r}, payload {self.payload_ring!r}>"
 
 
-def _wipe(*secrets: SendingKey | ReceiverKey | KeyRing | Scratch | None) -> None:
+def _wipe(*secrets: SendingKey | ReceiverKey | KeyRing | Rooms | None) -> None:
     for secret in secrets:
         if secret is not None:
             secret.wipe()

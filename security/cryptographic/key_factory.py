@@ -138,11 +138,10 @@ class AesGcmGmacKeyFactory:
         writer, remote = local_datawriter_crypto_handle, remote_participant_crypto_handle
         assert isinstance(writer, LocalWriter)
         assert isinstance(remote, RemoteParticipant)
-        _, of_submessages, _ = remote.local.scratch
         reader = RemoteReader(
             writer,
             remote,
-            ring=remote.exchange_ring if writer.is_volatile else KeyRing(self._wall_clock, of_submessages),
+            ring=remote.exchange_ring if writer.is_volatile else KeyRing(self._wall_clock, remote.local.rooms),
             receiver_key=self._new_receiver_key(writer.participant, writer.submessage_key, writer.submessage),
             relay_only=relay_only,
         )
@@ -184,12 +183,11 @@ class AesGcmGmacKeyFactory:
         reader, remote = local_datareader_crypto_handle, remote_participant_crypto_handle
         assert isinstance(reader, LocalReader)
         assert isinstance(remote, RemoteParticipant)
-        _, of_submessages, of_payloads = remote.local.scratch
         writer = RemoteWriter(
             reader,
             remote,
-            ring=remote.exchange_ring if reader.is_volatile else KeyRing(self._wall_clock, of_submessages),
-            payload_ring=KeyRing(self._wall_clock, of_payloads),
+            ring=remote.exchange_ring if reader.is_volatile else KeyRing(self._wall_clock, remote.local.rooms),
+            payload_ring=KeyRing(self._wall_clock, remote.local.rooms),
             receiver_key=self._new_receiver_key(reader.participant, reader.submessage_key, reader.submessage),
         )
         reader.matched.add(writer)

@@ -20,10 +20,11 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from ddsi.spi import Octets, Outcome
 
-from .aes_gcm import LARGE, Scratch, decrypter_into
+from .aes_gcm import LARGE, decrypt_into
 from .envelope import ENVELOPE_KINDS, HEAD, MESSAGE, SUBMESSAGE, Envelope, body_head
 from .opening import INFO_SRC_HEADS, as_message, with_header
 from .received_keys import KeyRing, ReceivedSession
+from .rooms import Rooms
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
 
 __all__ = [
@@ -60,13 +61,13 @@ _PAYLOAD_FOOT: Final = MAC_LENGTH + len(_NO_MACS)
 class _Encrypted:
     """Envelopes that begin with the same 16 octets: encrypted, for all receivers alike, in one session."""
 
-    __slots__ = ("_decrypt", "_decrypt_into", "_postfix_head", "_room")
+    __slots__ = ("_aead", "_decrypt", "_postfix_head", "_room")
 
-    def __init__(self, envelope: Envelope, aead: AESGCM, scratch: Scratch) -> None:
+    def __init__(self, envelope: Envelope, aead: AESGCM, rooms: Rooms) -> None:
         self._postfix_head = envelope.postfix_head
         self._decrypt = aead.decrypt
-        self._decrypt_into = decrypter_into(aead)
-        self._room = scratch.room
+        self._aead = aead
+        self._room = rooms.room
 
     def content(self, octets: Octets) -> Octets | None:
         """What lies in the envelope; else None, and the octets are as they were.
@@ -103,7 +104,7 @@ class _Encrypted:
             sealed = octets[_CONTENT_AT : MAC_LENGTH - _FOOT]
         try:
             room = self._room(length - _AROUND)
-            self._decrypt_into(nonce, sealed, None, room)
+            decrypt_into(self._aead, nonce, sealed, room)
             return room
         except InvalidTag:
             if not octets.readonly:
@@ -149,8 +150,8 @@ class MessageOpener:
 
     __slots__ = ("_content",)
 
-    def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
-        self._content = _Encrypted(MESSAGE, aead, scratch).content
+    def __init__(self, aead: AESGCM, rooms: Rooms) -> None:
+        self._content = _Encrypted(MESSAGE, aead, rooms).content
 
     def open(self, octets: Octets) -> Octets | None:
         """The message, with its header; else None, and ``octets`` are as they were."""
@@ -196,12 +197,12 @@ def _signed_layout(length: int) -> Callable[[Octets], tuple[bytes, ...]]:
 class PayloadOpener:
     """For payloads that begin with the same 12 octets: encrypted, in one session."""
 
-    __slots__ = ("_decrypt", "_decrypt_into", "_room")
+    __slots__ = ("_aead", "_decrypt", "_room")
 
-    def __init__(self, aead: AESGCM, scratch: Scratch) -> None:
+    def __init__(self, aead: AESGCM, rooms: Rooms) -> None:
         self._decrypt = aead.decrypt
-        self._decrypt_into = decrypter_into(aead)
-        self._room = scratch.room
+        self._aead = aead
+        self._room = rooms.room
 
     def open(self, octets: Octets) -> Octets | None:
         """The payload in ``octets``, behind which is no padding; else None, also where they were altered."""
@@ -217,7 +218,7 @@ class PayloadOpener:
             if length < LARGE:
                 return self._decrypt(nonce, sealed, None)
             room = self._room(content)
-            self._decrypt_into(nonce, sealed, None, room)
+            decrypt_into(self._aead, nonce, sealed, room)
             return room
         except InvalidTag:
             return None
@@ -235,7 +236,7 @@ def message_opener(
     if session is None or expected is None or octets[_RTPS_HEADER:at] != MESSAGE.prefix_head:
         return None
     if expected.encrypted:
-        return MessageOpener(session.aead, ring.scratch)
+        return MessageOpener(session.aead, ring.rooms)
     return SignedMessageOpener(session.aead)
 
 
@@ -244,7 +245,7 @@ def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None
     session = _session(octets[4:16], ring, expected)
     if session is None or expected is None or not expected.encrypted or octets[:4] != SUBMESSAGE.prefix_head:
         return None
-    return SubmessageOpener(SUBMESSAGE, session.aead, ring.scratch)
+    return SubmessageOpener(SUBMESSAGE, session.aead, ring.rooms)
 
 
 def payload_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> PayloadOpener | None:
@@ -252,7 +253,7 @@ def payload_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -
     session = _session(octets[:12], ring, expected)
     if session is None or expected is None or not expected.encrypted:
         return None
-    return PayloadOpener(session.aead, ring.scratch)
+    return PayloadOpener(session.aead, ring.rooms)
 
 
 def _session(octets: Octets, ring: KeyRing, expected: Protection | None) -> ReceivedSession | None:

@@ -113,7 +113,7 @@ def _open(envelope: Envelope, octets: Octets, at: int, ring: KeyRing, expected: 
                 continue
         else:
             try:
-                plain = decrypt_joined(session.aead, nonce, octets, content_at, content_end, mac, ring.scratch)
+                plain = decrypt_joined(session.aead, nonce, octets, content_at, content_end, mac, ring.rooms)
             except InvalidTag:
                 continue
         if expected is not None and expected.origin_authenticated:

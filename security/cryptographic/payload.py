@@ -20,8 +20,9 @@ from cryptography.exceptions import InvalidTag
 from ddsi.spi import Octets, Outcome, Parts, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
-from .aes_gcm import LARGE, Scratch, decrypt_sealed, encrypt_between
+from .aes_gcm import LARGE, decrypt_sealed, encrypt_into
 from .received_keys import KeyRing, ReceivedKey
+from .rooms import Rooms
 from .session_keys import NONCE_AT, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH, Protection
 
@@ -42,8 +43,8 @@ def overhead(protection: Protection | None) -> int:
     return (_CONTENT_AT if protection.encrypted else HEADER_LENGTH) + _LONGEST_PADDING + _FOOTER_LENGTH
 
 
-def encode_payload(plain: Octets, key: SendingKey, scratch: Scratch | None = None) -> Parts | Refused:
-    """The protected form of ``plain``, which may lie in ``scratch``."""
+def encode_payload(plain: Octets, key: SendingKey, rooms: Rooms) -> Parts | Refused:
+    """The protected form of ``plain``; if it is large, it lies in one of ``rooms``."""
     if len(plain) & 3:
         plain = bytes(plain) + bytes(-len(plain) & 3)
     length = len(plain)
@@ -53,9 +54,13 @@ def encode_payload(plain: Octets, key: SendingKey, scratch: Scratch | None = Non
     nonce = header[NONCE_AT:]
     if key.encrypts:
         head = header + length.to_bytes(4, "big")
-        if scratch is not None:
-            return (encrypt_between(head, plain, _NO_MACS, key.aead, nonce, scratch),)
-        return head, key.aead.encrypt(nonce, plain, None), _NO_MACS
+        if length < LARGE:
+            return head, key.aead.encrypt(nonce, plain, None), _NO_MACS
+        room = rooms.room(_CONTENT_AT + length + _FOOTER_LENGTH)
+        room[:_CONTENT_AT] = head
+        encrypt_into(key.aead, nonce, plain, room[_CONTENT_AT:-4])
+        room[-4:] = _NO_MACS
+        return (room,)
     return header, plain, key.aead.encrypt(nonce, b"", plain) + _NO_MACS
 
 
@@ -73,7 +78,7 @@ def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -
         return keys
     for key in keys:
         try:
-            return _open(octets, header, key, ring.scratch)
+            return _open(octets, header, key, ring.rooms)
         except InvalidTag:
             continue
         except MalformedMessage as error:
@@ -81,7 +86,7 @@ def decode_payload(octets: Octets, ring: KeyRing, expected: Protection | None) -
     return Rejected("the MAC of the payload is wrong")
 
 
-def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey, scratch: Scratch) -> bytes | memoryview:
+def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey, rooms: Rooms) -> bytes | memoryview:
     """Raises InvalidTag, MalformedMessage."""
     mac_at = len(octets) - _FOOTER_LENGTH
     if key.encrypts:
@@ -96,7 +101,7 @@ def _open(octets: bytes | memoryview, header: bytes, key: ReceivedKey, scratch: 
     session = key.sessions.get(session_id) or key.derive(session_id)
     plain = octets[HEADER_LENGTH:mac_at]
     if key.encrypts:
-        plain = decrypt_sealed(session.aead, nonce, octets[_CONTENT_AT:end], scratch)
+        plain = decrypt_sealed(session.aead, nonce, octets[_CONTENT_AT:end], rooms)
     elif not compare_digest(session.aead.encrypt(nonce, b"", plain), octets[mac_at:end]):
         raise InvalidTag
     if session_id not in key.sessions:

@@ -14,8 +14,8 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from ddsi.spi import NoKeys, Outcome, Rejected
 
-from .aes_gcm import Scratch
 from .key_material import KeyMaterial
+from .rooms import Rooms
 from .session_keys import session_key, session_receiver_key
 from .transformation import Protection, TransformationKind
 
@@ -79,11 +79,11 @@ class KeyRing:
     ``by_id``: one or two for each id, the newest first, as both may have one id.  A third drives out the oldest.
     """
 
-    __slots__ = ("_clock", "_previous_ends", "by_id", "current", "previous", "scratch")
+    __slots__ = ("_clock", "_previous_ends", "by_id", "current", "previous", "rooms")
 
-    def __init__(self, wall_clock: Callable[[], int], scratch: Scratch | None = None) -> None:
-        """``scratch``: where large octets are decrypted to; it may serve all rings of one purpose."""
-        self.scratch = Scratch() if scratch is None else scratch
+    def __init__(self, wall_clock: Callable[[], int], rooms: Rooms | None = None) -> None:
+        """``rooms``: where large octets are decrypted to."""
+        self.rooms = Rooms() if rooms is None else rooms
         self.current: ReceivedKey | None = None
         self.previous: ReceivedKey | None = None
         self._clock = wall_clock

@@ -12,6 +12,7 @@ from typing import Final
 from ddsi.messages.raw_submessage import SubmessageKind
 from ddsi.spi import Octets, Parts, Refused
 
+from .aes_gcm import LARGE
 from .envelope import FOOTER_LENGTH, HEAD, LONGEST_BODY, MESSAGE, RECEIVER_MAC_LENGTH, SUBMESSAGE, Envelope, body_head
 from .payload import USED_UP
 from .session_keys import NONCE_AT, ReceiverKey, SendingKey
@@ -34,11 +35,12 @@ def seal_submessage(submessage: Parts, key: SendingKey, receivers: Sequence[Rece
 
 def seal_message(message: Parts, key: SendingKey, receivers: Sequence[ReceiverKey]) -> Parts | Refused:
     """A message: its header, and protected an INFO_SRC that repeats the header, and all its submessages."""
-    first = message[0]
+    first, *rest = message
     if len(first) < HEADER_LENGTH:
-        message = (first := b"".join(message),)
-    parts = (_INFO_SRC_HEAD, memoryview(first)[4:], *message[1:])
-    return _seal(MESSAGE, bytes(first[:HEADER_LENGTH]), parts, key, receivers)
+        first, rest = b"".join(message), []
+    if len(first) >= LARGE:
+        first = memoryview(first)
+    return _seal(MESSAGE, bytes(first[:HEADER_LENGTH]), (_INFO_SRC_HEAD, first[4:], *rest), key, receivers)
 
 
 def _seal(

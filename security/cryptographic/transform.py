@@ -58,16 +58,12 @@ class AesGcmGmacTransform:
         plain_buffer: Octets,
         sending_datawriter_crypto: DatawriterCryptoHandle,
     ) -> Parts | Refused:
-        """§8.5.1.9.1.  Padded to a multiple of 4 where it is none; no inline QoS is added.
-
-        Where submessages are protected too, the payload goes into one of them at once, and need not be kept.
-        """
+        """§8.5.1.9.1.  Padded to a multiple of 4 where it is none; no inline QoS is added."""
         assert isinstance(sending_datawriter_crypto, LocalWriter)
         writer = sending_datawriter_crypto
         if writer.payload_key is None:
             return NO_KEY
-        scratch = writer.participant.sending if writer.submessage is not None else None
-        return payload.encode_payload(plain_buffer, writer.payload_key, scratch)
+        return payload.encode_payload(plain_buffer, writer.payload_key, writer.participant.rooms)
 
     def encode_datawriter_submessage(
         self,

@@ -18,6 +18,7 @@ from ddsi_security.cryptographic.openers import (
 from ddsi_security.cryptographic.opening import open_message, open_submessage
 from ddsi_security.cryptographic.payload import decode_payload, encode_payload
 from ddsi_security.cryptographic.received_keys import KeyRing
+from ddsi_security.cryptographic.rooms import Rooms
 from ddsi_security.cryptographic.sealing import seal_message, seal_submessage
 from ddsi_security.cryptographic.session_keys import SendingKey
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
@@ -215,4 +216,4 @@ def test_altered_payloads_are_left_to_the_general_way(size: int, at: int) -> Non
 
 
 def protected_payload(plain: bytes, key: SendingKey) -> bytes:
-    return octets_of(encode_payload(plain, key))
+    return octets_of(encode_payload(plain, key, Rooms()))

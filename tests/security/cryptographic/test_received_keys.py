@@ -8,6 +8,7 @@ from ddsi.spi import NoKeys, Rejected
 from ddsi_security.cryptographic import payload
 from ddsi_security.cryptographic.key_material import NO_KEY_MATERIAL, KeyMaterial
 from ddsi_security.cryptographic.received_keys import KeyRing
+from ddsi_security.cryptographic.rooms import Rooms
 from ddsi_security.cryptographic.session_keys import SendingKey
 from ddsi_security.cryptographic.transformation import TransformationKind
 from tests.security.cryptographic import vectors
@@ -24,7 +25,7 @@ def protected(of: KeyMaterial, *, seed: int = 1, max_blocks: int = 1 << 32, coun
     key = SendingKey(of, random.Random(seed).randbytes, max_blocks=max_blocks)
     found = []
     for _ in range(count):
-        buffer = octets_of(payload.encode_payload(vectors.PAYLOAD, key))
+        buffer = octets_of(payload.encode_payload(vectors.PAYLOAD, key, Rooms()))
         found.append(buffer)
     return found
 

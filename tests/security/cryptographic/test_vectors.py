@@ -6,6 +6,7 @@ import pytest
 
 from ddsi_security.cryptographic import opening, payload, sealing, session_keys
 from ddsi_security.cryptographic.key_material import KeyMaterial, exchange_key_material
+from ddsi_security.cryptographic.rooms import Rooms
 from ddsi_security.cryptographic.transformation import Protection, TransformationKind
 from ddsi_security.handles import SharedSecretHandle
 from tests.security.cryptographic import vectors
@@ -68,7 +69,7 @@ def test_key_material(found: KeyMaterial, octets: bytes) -> None:
 
 @pytest.mark.parametrize(("kind", "protected"), PAYLOADS)
 def test_payload(kind: TransformationKind, protected: bytes) -> None:
-    buffer = octets_of(payload.encode_payload(vectors.PAYLOAD, sending_key(material(kind))))
+    buffer = octets_of(payload.encode_payload(vectors.PAYLOAD, sending_key(material(kind)), Rooms()))
     assert buffer == protected
     assert payload.decode_payload(protected, ring(material(kind)), Protection(kind.encrypts)) == vectors.PAYLOAD
 
