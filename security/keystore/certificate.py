@@ -5,6 +5,7 @@ from __future__ import annotations
 from cryptography import x509
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives import serialization
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from ddsi.structure.errors import ConfigurationError
 
@@ -41,6 +42,23 @@ def is_authority(certificate: x509.Certificate) -> bool:
         return certificate.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
     except (x509.ExtensionNotFound, ValueError):
         return False
+
+
+def may_sign_documents(certificate: x509.Certificate) -> bool:
+    """Does it not say that its key is for something else than S/MIME (keyUsage, extendedKeyUsage)?"""
+    try:
+        extensions = certificate.extensions
+    except ValueError:
+        return True
+    for extension in extensions:
+        match extension.value:
+            case x509.KeyUsage() as usage if not (usage.digital_signature or usage.content_commitment):
+                return False
+            case x509.ExtendedKeyUsage() as usages if ExtendedKeyUsageOID.EMAIL_PROTECTION not in usages:
+                return False
+            case _:
+                continue
+    return True
 
 
 def is_issued_by(certificate: x509.Certificate, authority: x509.Certificate) -> bool:

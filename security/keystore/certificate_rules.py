@@ -11,7 +11,7 @@ from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 
-from .certificate import certificate_validity, is_authority, is_issued_by
+from .certificate import certificate_validity, is_authority, is_issued_by, may_sign_documents
 from .distinguished_name import rfc2253_text
 from .finding import Finding, Rule, Severity
 from .horizon import Horizon
@@ -22,7 +22,9 @@ __all__ = [
     "KEY_UNREADABLE",
     "RULES",
     "check_authority",
+    "check_document_signer",
     "check_identity",
+    "check_identity_issuer",
     "check_key",
     "check_shared_authority",
 ]
@@ -39,13 +41,15 @@ WEAK_ALGORITHM: Final = Rule("weak-algorithm", Severity.ERROR, "a key or a signa
 UNSUPPORTED_KEY: Final = Rule("unsupported-key", Severity.ERROR, "a key of a kind that DDS Security does not know")
 P384_KEY: Final = Rule("p384-key", Severity.WARNING, "EC P-384, which came with DDS Security 1.2")
 NOT_AUTHORITY: Final = Rule("ca-not-authority", Severity.WARNING, "a CA's certificate does not say that it is one")
+INTERMEDIATE: Final = Rule("ca-intermediate", Severity.WARNING, "another authority issued the identity CA")
+MAY_NOT_SIGN: Final = Rule("ca-may-not-sign", Severity.WARNING, "the permissions CA's key is not for documents")
 IDENTITY_IS_AUTHORITY: Final = Rule("identity-is-ca", Severity.WARNING, "an identity may issue further identities")
 SHARED_AUTHORITY: Final = Rule("shared-ca", Severity.NOTE, "one authority issues identities and signs permissions")
 SUBJECT_REPEATS: Final = Rule("subject-repeats", Severity.WARNING, "a subject with two values of one kind")
 RULES: Final = (
     *(CERTIFICATE_UNREADABLE, KEY_UNREADABLE, KEY_HAS_PASSWORD, KEY_MISMATCH, EXPIRED, NOT_YET_VALID, EXPIRES_SOON),
-    *(WRONG_CA, WEAK_ALGORITHM, UNSUPPORTED_KEY, P384_KEY, NOT_AUTHORITY, IDENTITY_IS_AUTHORITY, SHARED_AUTHORITY),
-    SUBJECT_REPEATS,
+    *(WRONG_CA, WEAK_ALGORITHM, UNSUPPORTED_KEY, P384_KEY, NOT_AUTHORITY, INTERMEDIATE, MAY_NOT_SIGN),
+    *(IDENTITY_IS_AUTHORITY, SHARED_AUTHORITY, SUBJECT_REPEATS),
 )
 
 _LEAST_RSA_BITS: Final = 2048
@@ -87,6 +91,30 @@ def check_authority(authority: Certified, what: str, horizon: Horizon) -> Iterat
             path,
             f"the {what}'s certificate has no basicConstraints with CA:TRUE, which some verify",
             remedy="make it with ddsi keystore ca, or openssl req -x509 -addext basicConstraints=critical,CA:TRUE",
+        )
+
+
+def check_identity_issuer(authority: Certified) -> Iterator[Finding]:
+    """The certificate of the identity CA, beyond what is asked of every authority."""
+    path, certificate = authority
+    if certificate.issuer != certificate.subject:
+        yield INTERMEDIATE.at(
+            path,
+            f"the identity CA was itself issued by {rfc2253_text(certificate.issuer)}: Cyclone DDS 0.10 and Fast DDS "
+            "2.9 refuse one that is not self-signed",
+            remedy="make a self-signed one for this domain where they take part: ddsi keystore ca",
+        )
+
+
+def check_document_signer(authority: Certified) -> Iterator[Finding]:
+    """The certificate of the permissions CA, beyond what is asked of every authority."""
+    path, certificate = authority
+    if not may_sign_documents(certificate):
+        yield MAY_NOT_SIGN.at(
+            path,
+            "keyUsage lacks digitalSignature, or extendedKeyUsage emailProtection: Cyclone DDS and Fast DDS, which "
+            "verify S/MIME by OpenSSL, then refuse all documents",
+            remedy="make it anew and sign the documents again: ddsi keystore ca, permissions and governance",
         )
 
 

@@ -20,7 +20,9 @@ from .certificate_rules import (
     KEY_UNREADABLE,
     Certified,
     check_authority,
+    check_document_signer,
     check_identity,
+    check_identity_issuer,
     check_key,
     check_shared_authority,
 )
@@ -75,7 +77,11 @@ class _Linter:
     def check_enclave(self, enclave: Enclave) -> None:
         """The six files, then what they are to each other."""
         identity_ca = self._authority(enclave.identity_ca, "identity CA")
+        if identity_ca:
+            self._add(check_identity_issuer(identity_ca))
         permissions_ca = self._authority(enclave.permissions_ca, "permissions CA")
+        if permissions_ca:
+            self._add(check_document_signer(permissions_ca))
         identity = self._certificate(enclave.certificate, "the identity's certificate", _make_identity(enclave))
         if identity:
             self._add(check_identity(identity, identity_ca, self._horizon))

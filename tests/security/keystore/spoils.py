@@ -8,8 +8,10 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from ddsi_security.keystore.authority import Authority
+from ddsi_security.keystore.distinguished_name import parse_name
 from ddsi_security.keystore.identity import Identity
 from ddsi_security.keystore.key_pair import Algorithm, generate_key, private_key_pem
 
@@ -25,12 +27,23 @@ ALL_NONE = [
     ("<enable_liveliness_protection>true", "<enable_liveliness_protection>false"),
 ]
 
+CERTIFICATES_ALONE = x509.KeyUsage(
+    digital_signature=False, content_commitment=False, key_encipherment=False, data_encipherment=False,
+    key_agreement=False, key_cert_sign=True, crl_sign=True, encipher_only=False, decipher_only=False,
+)  # fmt: skip
+
 
 def certificate(
-    workshop: Workshop, subject: str, key: rsa.RSAPrivateKey | ec.EllipticCurvePrivateKey, *, ca: bool | None
+    workshop: Workshop,
+    subject: str,
+    key: rsa.RSAPrivateKey | ec.EllipticCurvePrivateKey,
+    *,
+    ca: bool | None,
+    issuer: Authority | None = None,
+    usage: x509.KeyUsage | x509.ExtendedKeyUsage | None = None,
 ) -> x509.Certificate:
-    """One from the workshop's identity CA; ``ca`` None: without basicConstraints."""
-    issuer = workshop.identity_ca
+    """One from the workshop's identity CA, or another ``issuer``; ``ca`` None: without basicConstraints."""
+    issuer = issuer or workshop.identity_ca
     builder = (
         x509.CertificateBuilder()
         .subject_name(x509.Name.from_rfc4514_string(subject))
@@ -42,6 +55,8 @@ def certificate(
     )
     if ca is not None:
         builder = builder.add_extension(x509.BasicConstraints(ca=ca, path_length=None), critical=True)
+    if usage is not None:
+        builder = builder.add_extension(usage, critical=True)
     return builder.sign(issuer.private_key, hashes.SHA256())
 
 
@@ -184,6 +199,22 @@ def _(workshop: Workshop) -> None:
 def _(workshop: Workshop) -> None:
     key = workshop.identity_ca.private_key
     workshop.identity_ca = Authority(certificate(workshop, "CN=Identity CA,O=Example", key, ca=None), key)
+
+
+@spoils("ca-intermediate", "identity_ca.cert.pem")
+def _(workshop: Workshop) -> None:
+    root = Authority.create(parse_name("/O=Example/CN=Root"), Algorithm.EC, workshop.validity)
+    key = workshop.identity_ca.private_key
+    workshop.identity_ca = Authority(certificate(workshop, "CN=Identity CA,O=Example", key, ca=True, issuer=root), key)
+
+
+for usage in (CERTIFICATES_ALONE, x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])):
+
+    @spoils("ca-may-not-sign", "permissions_ca.cert.pem")
+    def _(workshop: Workshop, usage: x509.KeyUsage | x509.ExtendedKeyUsage = usage) -> None:
+        own, key = workshop.permissions_ca, workshop.permissions_ca.private_key
+        made = certificate(workshop, "CN=Permissions CA,O=Example", key, ca=True, issuer=own, usage=usage)
+        workshop.permissions_ca = workshop.document_signer = Authority(made, key)
 
 
 @spoils("identity-is-ca", "cert.pem")
