@@ -20,6 +20,7 @@ from .xml_document import Element
 __all__ = ["Settings"]
 
 _T = TypeVar("_T")
+_PASSWORD = SECURITY["Security/Authentication/Password"]
 _DEFAULT_TRACE_FILE = "ddsi-trace.jsonl"
 
 
@@ -216,9 +217,24 @@ class _DomainReader:
             )
 
     def _security_property(self, element: Element, word: Word) -> None:
-        name, text = SECURITY[word.path], self._expand(element.text, self._place(element, word))
+        name, place = SECURITY[word.path], self._place(element, word)
+        text = self._expand_secret(element.text, place) if name == _PASSWORD else self._expand(element.text, place)
         if name and text:
             self._settings.security[name] = text
+
+    def _expand_secret(self, text: str, place: str) -> str:
+        """A ``${`` may be part of a password, and not meant as a variable: nothing of it is shown."""
+
+        def on_unset(_name: str) -> None:
+            self._settings.warnings.append(f"{place}: an environment variable in it is not set and reads as empty")
+
+        try:
+            return expand_variables(text, self._settings.variables, on_unset).strip()
+        except ValueError:
+            raise ConfigurationError(
+                f"{place} holds ${{, and no environment variable that can be read follows: give a password that holds "
+                "these characters by a variable, ${NAME}"
+            ) from None
 
     # --- values and places ---
 

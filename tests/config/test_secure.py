@@ -115,6 +115,27 @@ def test_a_configuration_shows_which_properties_it_has_and_no_value() -> None:
     assert "/k/" not in text
 
 
+def with_password(password: str) -> Config:
+    xml = f"<Domain><Security><Authentication><Password>{password}</Password></Authentication></Security></Domain>"
+    return Config.from_uri(xml, environ={})
+
+
+@pytest.mark.parametrize("password", ["hun${ter2", "${NO:?hunter2}", "${hun hunter2:}"])
+def test_a_password_that_looks_like_a_variable_is_not_shown(password: str) -> None:
+    with pytest.raises(
+        ConfigurationError, match="give a password that holds these characters by a variable"
+    ) as refusal:
+        with_password(password)
+    assert "hun" not in str(refusal.value)
+    assert "ter2" not in str(refusal.value)
+
+
+def test_what_a_password_names_as_a_variable_is_not_shown_though_it_is_not_set() -> None:
+    (warning,) = with_password("x${hunter2}").config_warnings
+    assert warning.endswith("an environment variable in it is not set and reads as empty")
+    assert "hunter2" not in warning
+
+
 def test_either_place_serves_and_both_when_they_agree() -> None:
     text = {name: Property(value) for name, value in PROPERTIES.items()}
     assert participant_properties(None, configured()) == text
