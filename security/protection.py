@@ -228,6 +228,9 @@ class Protection:
             plain = opener(protected)
             if plain is not None:
                 pair.participant.opened += 1
+                start = _SENDER.get(plain[0])
+                if start is not None and plain[start : start + 4] == pair.remote_entity:
+                    return plain
                 return plain if _names(plain, pair.remote_entity) else _speaks_for_another(pair)
         return self._decode_submessage(protected, source)
 
@@ -308,7 +311,10 @@ class Protection:
         return plain
 
     def protects_payload(self, writer: Guid) -> bool:
-        return self._payload_pair(writer) is not None
+        try:
+            return self._payload_pairs[writer] is not None
+        except KeyError:
+            return self._payload_pair(writer) is not None
 
     def opens_after_joining(self, reader: Guid) -> bool:
         """Only the vendor tells: nothing on the wire announces it, and who cannot open a sample says nothing."""

@@ -47,6 +47,7 @@ _TIMESTAMP = struct.Struct("<II")
 _LE_DATA_ONLY = 0x05  # flags E and D: a sample, little-endian, without inline QoS
 _LE_DATA_AND_QOS = 0x07
 _SEC_PREFIX = int(SubmessageKind.SEC_PREFIX)
+_SRTPS_PREFIX = int(SubmessageKind.SRTPS_PREFIX)
 _UNKNOWN_ID = bytes(4)
 _CONTRADICTIONS_OF_A_RESTART = 3  # one or two may be HEARTBEATs that were long under way
 # What one message may ask for beyond its parsing, counted as if each were so many members of a number set.  Honest ones
@@ -149,7 +150,7 @@ class Inbound:
                 self._engine.liveliness.revive(participant, incoming.now)
 
     def _message(self, incoming: Incoming, view: memoryview) -> None:
-        if len(view) >= 24 and view[20] == SubmessageKind.SRTPS_PREFIX:
+        if len(view) >= 24 and view[20] == _SRTPS_PREFIX:
             decoded = self._hooks.decode_message(view, incoming.prefix)
             if isinstance(decoded, Outcome):
                 self.undecodable(decoded, incoming.source)

@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from ddsi.spi import Octets, Outcome
 
-from .aes_gcm import LARGE, decrypt_into
+from .aes_gcm import LARGE, decrypter_into
 from .envelope import ENVELOPE_KINDS, HEAD, MESSAGE, SUBMESSAGE, Envelope, body_head
 from .opening import INFO_SRC_HEADS, as_message, with_header
 from .received_keys import KeyRing, ReceivedSession
@@ -61,12 +61,12 @@ _PAYLOAD_FOOT: Final = MAC_LENGTH + len(_NO_MACS)
 class _Encrypted:
     """Envelopes that begin with the same 16 octets: encrypted, for all receivers alike, in one session."""
 
-    __slots__ = ("_aead", "_decrypt", "_postfix_head", "_room")
+    __slots__ = ("_decrypt", "_decrypt_into", "_postfix_head", "_room")
 
     def __init__(self, envelope: Envelope, aead: AESGCM, rooms: Rooms) -> None:
         self._postfix_head = envelope.postfix_head
         self._decrypt = aead.decrypt
-        self._aead = aead
+        self._decrypt_into = decrypter_into(aead)
         self._room = rooms.room
 
     def content(self, octets: Octets) -> Octets | None:
@@ -75,7 +75,7 @@ class _Encrypted:
         None also where they were altered: the general way says in what.
         """
         length = len(octets)
-        if length >= LARGE or not isinstance(octets, bytes):
+        if length >= LARGE:
             return self._large_content(memoryview(octets))
         if length < _LEAST:
             return None
@@ -102,19 +102,24 @@ class _Encrypted:
         else:
             octets[-_FOOT : MAC_LENGTH - _FOOT] = mac
             sealed = octets[_CONTENT_AT : MAC_LENGTH - _FOOT]
+        room = self._room(length - _AROUND)
         try:
-            room = self._room(length - _AROUND)
-            decrypt_into(self._aead, nonce, sealed, room)
-            return room
+            self._decrypt_into(nonce, sealed, None, room)
         except InvalidTag:
-            if not octets.readonly:
-                octets[-_FOOT:] = b"".join((postfix_head, mac, count))
+            self._put_back(octets)
             return None
+        return room
+
+    def _put_back(self, octets: Octets) -> None:
+        """The general way is to find the octets as they were: the MAC goes back to its place."""
+        if isinstance(octets, memoryview) and not octets.readonly and len(octets) >= LARGE:
+            mac = bytes(octets[-_FOOT : MAC_LENGTH - _FOOT])
+            octets[-_FOOT:] = b"".join((self._postfix_head, mac, _NO_MACS))
 
 
 # Few lengths are in use at a time, and one call that takes all apart is quicker than a slice for each.
 @lru_cache(maxsize=256)
-def _layout(length: int) -> tuple[Callable[[bytes], tuple[bytes, ...]], bytes]:
+def _layout(length: int) -> tuple[Callable[[Octets], tuple[bytes, ...]], bytes]:
     """Of an envelope with so many octets: its parts, from the nonce on, and the head of SEC_BODY as it must be."""
     content = length - _CONTENT_AT - _FOOT
     parts = struct.Struct(f"{_NONCE_AT}x12s8s{content}s4s{MAC_LENGTH}s4s")
@@ -141,27 +146,28 @@ class SubmessageOpener(_Encrypted):
             return None
         kind, flags, following = HEAD.unpack_from(plain)
         if not flags & 1 or following != len(octets) - _LEAST or kind in ENVELOPE_KINDS:
+            self._put_back(octets)
             return None
         return plain
 
 
-class MessageOpener:
+class MessageOpener(_Encrypted):
     """For messages that follow their header with the same 16 octets, and end with SRTPS_POSTFIX: encrypted ones."""
 
-    __slots__ = ("_content",)
-
-    def __init__(self, aead: AESGCM, rooms: Rooms) -> None:
-        self._content = _Encrypted(MESSAGE, aead, rooms).content
+    __slots__ = ()
 
     def open(self, octets: Octets) -> Octets | None:
         """The message, with its header; else None, and ``octets`` are as they were."""
-        if len(octets) < LARGE:
-            octets = bytes(octets)
-        plain = self._content(octets[_RTPS_HEADER:])
+        octets = bytes(octets) if len(octets) < LARGE else memoryview(octets)
+        envelope = octets[_RTPS_HEADER:]
+        plain = self.content(envelope)
         if plain is None:
             return None
         message = as_message(plain, octets)
-        return None if isinstance(message, Outcome) else message
+        if isinstance(message, Outcome):
+            self._put_back(envelope)
+            return None
+        return message
 
 
 class SignedMessageOpener:
@@ -197,11 +203,11 @@ def _signed_layout(length: int) -> Callable[[Octets], tuple[bytes, ...]]:
 class PayloadOpener:
     """For payloads that begin with the same 12 octets: encrypted, in one session."""
 
-    __slots__ = ("_aead", "_decrypt", "_room")
+    __slots__ = ("_decrypt", "_decrypt_into", "_room")
 
     def __init__(self, aead: AESGCM, rooms: Rooms) -> None:
         self._decrypt = aead.decrypt
-        self._aead = aead
+        self._decrypt_into = decrypter_into(aead)
         self._room = rooms.room
 
     def open(self, octets: Octets) -> Octets | None:
@@ -218,7 +224,7 @@ class PayloadOpener:
             if length < LARGE:
                 return self._decrypt(nonce, sealed, None)
             room = self._room(content)
-            decrypt_into(self._aead, nonce, sealed, room)
+            self._decrypt_into(nonce, sealed, None, room)
             return room
         except InvalidTag:
             return None
@@ -236,7 +242,7 @@ def message_opener(
     if session is None or expected is None or octets[_RTPS_HEADER:at] != MESSAGE.prefix_head:
         return None
     if expected.encrypted:
-        return MessageOpener(session.aead, ring.rooms)
+        return MessageOpener(MESSAGE, session.aead, ring.rooms)
     return SignedMessageOpener(session.aead)
 
 

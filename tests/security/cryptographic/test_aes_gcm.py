@@ -28,12 +28,12 @@ def test_into_a_room_and_out_of_it(size: int, kind: type) -> None:
     plain, room = random.Random(size).randbytes(size), memoryview(bytearray(size + 16))
     aes_gcm.encrypt_into(AEAD, NONCE, kind(plain), room)
     assert room == AEAD.encrypt(NONCE, plain, None)
-    found = memoryview(bytearray(size))
-    aes_gcm.decrypt_into(AEAD, NONCE, room, found)
+    found, decrypt_into = memoryview(bytearray(size)), aes_gcm.decrypter_into(AEAD)
+    decrypt_into(NONCE, room, None, found)
     assert found == plain
     room[-1] ^= 1
     with pytest.raises(InvalidTag):
-        aes_gcm.decrypt_into(AEAD, NONCE, room, found)
+        decrypt_into(NONCE, room, None, found)
 
 
 @pytest.mark.usefixtures("_has_into")

@@ -91,6 +91,17 @@ def test_unusual_submessages_are_left_to_the_general_way(plain: bytes) -> None:
     assert opener.open(sealed(plain, key)) is None
 
 
+def test_the_general_way_opens_large_ones_that_are_big_endian() -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    plain = struct.pack(">BBH", 0x15, 4, 40_000) + bytes(40_000)
+    octets = memoryview(bytearray(sealed(plain, key)))
+    before = bytes(octets)
+    assert opener.open(octets) is None
+    assert octets == before
+    assert open_submessage(octets, keys, ENCRYPTED) == plain
+
+
 def test_there_is_none_where_more_is_asked_for_than_encryption_for_all() -> None:
     keys, first = ring(material()), sealed(submessage(24), sending_key())
     assert submessage_opener(first, keys, ENCRYPTED) is None, "nothing was opened in this session yet"
