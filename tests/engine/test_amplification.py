@@ -30,6 +30,9 @@ from tests.fuzz.session import Session
 VICTIM = Locator.udp_v4("10.66.66.66", 7410)
 ATTACKER = Locator.udp_v4("10.1.1.1", 7410)
 FACTOR = 40
+_LEASE = b"\x02\x00\x08\x00"
+REQUESTS_FACTOR = 1200
+"""Where we begin: a request with its certificate and permissions is ten times an announcement, and is repeated."""
 """Octets sent for an octet of a first announcement, at most, to a host that it came from and that says no more."""
 
 
@@ -178,3 +181,18 @@ def test_who_has_spoken_gets_a_few_times_what_he_said(make: Callable[[], Partici
                 ledger.hear(octets, VICTIM)
     ledger.wait(120)
     assert sum(map(len, ledger.to(VICTIM))) < ledger.received
+
+
+def test_who_has_spoken_and_is_asked_to_authenticate_gets_some_requests() -> None:
+    """Of two participants the one with the lower Guid begins, and a stranger says which Guid he has."""
+    ledger = Ledger(secured())
+    stranger = Stranger(1, address=VICTIM)
+    stranger.prefix = GuidPrefix(b"\xff" * 12)
+    said = _with_tokens(stranger)
+    lease = said.index(_LEASE) + len(_LEASE)
+    ledger.hear(said[:lease] + b"\xff\xff\xff\x7f" + said[lease + 4 :], VICTIM)
+    ledger.wait(100)
+    in_time = sum(map(len, ledger.to(VICTIM)))
+    assert ledger.received < in_time < REQUESTS_FACTOR * ledger.received
+    ledger.wait(900)
+    assert sum(map(len, ledger.to(VICTIM))) < in_time * 1.2, "it is given up"
