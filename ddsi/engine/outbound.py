@@ -110,7 +110,8 @@ class Outbound:
         behavior = writer.behavior
         if not behavior.locators:
             return
-        if not _is_usual(change, None):
+        is_alone = change.related is None and change.original is None and change.coherence is None
+        if change.kind is not ChangeKind.ALIVE or not is_alone:
             self._send_data(writer, change, None)
             return
         payload = self._hooks.encode_payload(writer.guid, change.payload)

@@ -112,9 +112,10 @@ class _Encrypted:
 
     def _put_back(self, octets: Octets) -> None:
         """The general way is to find the octets as they were: the MAC goes back to its place."""
-        if isinstance(octets, memoryview) and not octets.readonly and len(octets) >= LARGE:
-            mac = bytes(octets[-_FOOT : MAC_LENGTH - _FOOT])
-            octets[-_FOOT:] = b"".join((self._postfix_head, mac, _NO_MACS))
+        view = memoryview(octets)
+        if not view.readonly and len(view) >= LARGE:
+            mac = bytes(view[-_FOOT : MAC_LENGTH - _FOOT])
+            view[-_FOOT:] = b"".join((self._postfix_head, mac, _NO_MACS))
 
 
 # Few lengths are in use at a time, and one call that takes all apart is quicker than a slice for each.

@@ -31,7 +31,7 @@ from .envelope import (
 from .received_keys import KeyRing
 from .transformation import HEADER_LENGTH, KEY_ID_LENGTH, MAC_LENGTH, Protection
 
-__all__ = ["INFO_SRC_HEADS", "as_message", "open_message", "open_submessage"]
+__all__ = ["INFO_SRC_HEADS", "as_message", "open_message", "open_submessage", "with_header"]
 
 _RTPS: Final = b"RTPS"
 INFO_SRC_HEADS: Final = (bytes((SubmessageKind.INFO_SRC, 1, 20, 0)), bytes((SubmessageKind.INFO_SRC, 0, 0, 20)))
