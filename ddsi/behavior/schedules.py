@@ -108,7 +108,8 @@ class AckNackSchedule:
         self._repeat = NACK_REPEAT_FIRST
         self._response = -1.0  # smoothed seconds from asking to the answer; negative: none was measured yet
         self._asked_at = -math.inf
-        self._asked: dict[int, tuple[float, float]] = {}  # numbers that were asked for: when first, when last
+        # Numbers that were asked for: how often, when first, when last.
+        self._asked: dict[int, tuple[int, float, float]] = {}
 
     @property
     def is_preemptive(self) -> bool:
@@ -178,8 +179,8 @@ class AckNackSchedule:
         if len(self._asked) > _MAX_TIMED:
             self._asked.clear()
         for number in numbers:
-            first, _ = self._asked.get(number, (now, now))
-            self._asked[number] = (first, now)
+            times, first, _ = self._asked.get(number, (0, now, now))
+            self._asked[number] = (times + 1, first, now)
         self.asked_sn = max(self.asked_sn, numbers[-1])
         self.wait(max(self.repeat_due, now + NACK_DELAY))
 
@@ -191,16 +192,17 @@ class AckNackSchedule:
     def arrived(self, now: float, sequence_number: int) -> None:
         """This number, or a part of it, came.  If it had been asked for, the writer answers, and this is how fast.
 
-        Where it was asked for twice, nobody can tell which question is answered (Karn's rule for TCP), but this much:
-        the time since the last is a lower bound, and what comes right behind it answers an earlier one, which was
-        then repeated too soon.
+        Where it was asked for more than once, nobody can tell which question is answered (Karn's rule for TCP), but
+        this much: the time since the last is a lower bound, and of two questions what comes right behind the second
+        answers the first, which was then repeated too soon.  Of more than two it does not: where most answers are
+        lost, the first may lie seconds back, and who took that for the time of an answer would hardly ask any more.
         """
         if sequence_number > self.asked_sn:
             return
         asked = self._asked.pop(sequence_number, None)
         if asked is not None:
-            first, last = asked
-            if first == last or now - last < self._response / 2:
+            times, first, last = asked
+            if times == 1 or (times == 2 and now - last < self._response / 2):
                 elapsed = now - first
                 self._response = elapsed if self._response < 0 else self._response * 0.75 + elapsed * 0.25
             else:

@@ -229,6 +229,18 @@ def test_losses_do_not_make_a_fast_link_seem_slow() -> None:
     assert schedule.repeat_due - now == pytest.approx(NACK_REPEAT_MIN)
 
 
+def test_who_asks_often_in_vain_does_not_take_that_for_the_time_of_an_answer() -> None:
+    """One late answer makes the others seem early, but what was asked for thrice does not answer the first question."""
+    schedule = in_step()
+    ask(schedule, 0.0, 1)
+    schedule.arrived(0.2, 1)
+    for step in range(50):
+        ask(schedule, 1.0 + 0.5 * step, 2, again=step > 0)
+    schedule.arrived(25.52, 2)
+    ask(schedule, 26.0, 3)
+    assert schedule.repeat_due == pytest.approx(26.0 + 2 * 0.2 + NACK_DELAY)
+
+
 def test_a_link_that_is_slower_than_expected_is_found_to_be_so() -> None:
     """Though each question is repeated before the first answer can be here."""
     schedule = in_step()
