@@ -14,6 +14,7 @@ from ..transport.host_facts import (
     is_clock_synchronized,
     packet_filter_signs,
     port_holders,
+    reassembly_counts,
 )
 from ..transport.platform import Interface
 from ..transport.udp import UdpTransport
@@ -22,6 +23,8 @@ from .finding import Finding, Verdict
 __all__ = ["host_findings"]
 
 _WANTED_FRAGMENT_MEMORY = 4 << 20
+_FRAGMENT_MEMORY_WHERE_SOME_ARE_LOST = 128 << 20
+_LOST_FRAGMENTS = 0.01  # so large a part of those that came shows that it is no accident
 _MOST_NAMED = 8
 
 
@@ -75,7 +78,18 @@ def _filters() -> Finding:
 
 
 def _fragments(largest: int, interfaces: Iterable[Interface]) -> Finding:
-    """A datagram larger than the MTU is fragmented by IP, and lost as a whole with any of its fragments."""
+    """A datagram larger than the MTU is fragmented by IP, and lost as a whole with any of its fragments.
+
+    Ours are not, unless the configuration says so; what others send to this host may be.
+    """
+    came, lost = reassembly_counts() or (0, 0)
+    if lost > came * _LOST_FRAGMENTS:
+        text = f"{lost} of {came} IP fragments that came to this host could not be joined to datagrams"
+        advice = (
+            "find where frames are lost, let the peers send smaller messages, or "
+            f"sysctl -w net.ipv4.ipfrag_high_thresh={_FRAGMENT_MEMORY_WHERE_SOME_ARE_LOST} net.ipv4.ipfrag_time=3"
+        )
+        return Finding("fragments", Verdict.WARNING, text, advice)
     narrow = [one for one in interfaces if not one.is_loopback and 0 < one.mtu - 28 < largest]
     memory = fragment_memory()
     if memory is not None and memory < _WANTED_FRAGMENT_MEMORY and narrow:

@@ -23,6 +23,7 @@ __all__ = [
     "packet_filter_signs",
     "port_holders",
     "probe_port",
+    "reassembly_counts",
     "source_towards",
 ]
 
@@ -105,6 +106,16 @@ def fragment_memory() -> int | None:
     try:
         return int((_PROC / "sys/net/ipv4/ipfrag_high_thresh").read_text())
     except (OSError, ValueError):
+        return None
+
+
+def reassembly_counts() -> tuple[int, int] | None:
+    """How many IPv4 fragments have come to this host, and how many could not be joined (ReasmReqds, ReasmFails)."""
+    try:
+        names, values = ((_PROC / "net/snmp").read_text().splitlines())[:2]
+        counts = dict(zip(names.split(), values.split(), strict=True))
+        return int(counts["ReasmReqds"]), int(counts["ReasmFails"])
+    except (OSError, ValueError, KeyError):
         return None
 
 

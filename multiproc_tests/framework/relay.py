@@ -32,6 +32,11 @@ MAX_FRAMES_ON_THE_WAY = 200_000
 MAX_FRAMES_PER_TURN = 64
 """Frames read from one end before the others have their turn."""
 
+_REASSEMBLY_OCTETS = 128 << 20
+# Linux keeps an incomplete datagram for 30 s, and has 4 MiB for all of them, which is 78 of 41 KB: after so many,
+# nothing that comes in fragments is received until the first are 30 s old.  A test of how losses are repaired would
+# then be one of how long that takes.
+
 
 @dataclass(frozen=True, slots=True)
 class _End:
@@ -229,6 +234,7 @@ def _make_end(stack: ExitStack, name: str, number: int, mtu: int) -> _End:
     # IPv6 would send router solicitations and the like over the relay.  Where the setting is read-only, it does.
     made.set_sysctl("net.ipv6.conf.all.disable_ipv6", "1")
     made.set_sysctl("net.ipv6.conf.default.disable_ipv6", "1")
+    made.set_sysctl("net.ipv4.ipfrag_high_thresh", str(_REASSEMBLY_OCTETS))
     mac = bytes((2, 0, 0, 0, 0, number))
     device = open_tap(made, "tap0", _mac_text(mac))
     stack.callback(_close_quietly, device)

@@ -7,6 +7,7 @@ import re
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import trio
@@ -17,7 +18,8 @@ from ddsi.cli.doctor import Finding, Verdict, examine
 from ddsi.cli.doctor_peers import peer_findings
 from ddsi.config import Config
 from ddsi.config.environment import load_config
-from ddsi.transport.host_facts import PortHolder, port_holders, probe_port, source_towards
+from ddsi.transport import host_facts
+from ddsi.transport.host_facts import PortHolder, port_holders, probe_port, reassembly_counts, source_towards
 from ddsi.transport.platform import Interface
 from ddsi.transport.self_test import multicast_returns, unicast_returns
 
@@ -188,11 +190,34 @@ def test_signs_of_a_packet_filter_come_with_advice(monkeypatch: pytest.MonkeyPat
 
 
 def test_fragments_that_find_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor_host, "reassembly_counts", lambda: None)
     monkeypatch.setattr(doctor_host, "fragment_memory", lambda: 262_144)
     narrow = doctor_host._fragments(65_000, [NOWHERE])
     assert narrow.verdict is Verdict.WARNING
     assert "ipfrag_high_thresh=4194304" in narrow.advice
     assert doctor_host._fragments(1400, [NOWHERE]).text == "messages of up to 1400 octets go unfragmented"
+
+
+@pytest.mark.parametrize(("came", "lost", "verdict"), [(0, 0, "ok"), (100_000, 30, "ok"), (15_033, 11_616, "warning")])
+def test_fragments_of_others_that_were_in_vain(
+    came: int, lost: int, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Our own messages fit a frame here; a peer's did not."""
+    monkeypatch.setattr(doctor_host, "reassembly_counts", lambda: (came, lost))
+    finding = doctor_host._fragments(1400, [NOWHERE])
+    assert finding.verdict == verdict
+    assert ("11616 of 15033 IP fragments" in finding.text) == (verdict == "warning")
+    assert ("ipfrag_time" in finding.advice) == (verdict == "warning")
+
+
+def test_the_host_counts_fragments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host_facts, "_PROC", tmp_path)
+    assert reassembly_counts() is None, "another system has no such file"
+    (tmp_path / "net").mkdir()
+    (tmp_path / "net/snmp").write_text("Ip: Forwarding ReasmReqds ReasmOKs ReasmFails\nIp: 2 404 130 7\nIcmp: InMsgs\n")
+    assert reassembly_counts() == (404, 7)
+    (tmp_path / "net/snmp").write_text("Ip: Forwarding\nIp: 2\n")
+    assert reassembly_counts() is None
 
 
 @pytest.mark.parametrize(("answer", "verdict"), [(None, "ok"), (True, "ok"), (False, "warning")])
