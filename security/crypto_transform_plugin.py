@@ -161,12 +161,17 @@ class OpensAlike(Protocol):
         self,
         encoded_rtps_submessage: Octets,
         sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
-    ) -> Callable[[Octets], Octets | None] | None:
-        """The same for submessages that begin with the same 16 octets."""
+        entity_id: bytes,
+    ) -> Callable[[memoryview, int, int], tuple[Octets, int] | None] | None:
+        """The same for submessages that begin with the same 16 octets, and name the sender's ``entity_id``.
+
+        They are opened where they lie, by the message, where SEC_PREFIX begins and where the message ends; with what
+        is opened comes where SEC_POSTFIX ends.
+        """
         ...
 
     def payload_opener(
         self, encoded_buffer: Octets, sending_datawriter_crypto: DatawriterCryptoHandle
-    ) -> Callable[[Octets], Octets | None] | None:
-        """The same for payloads that begin with the same 12 octets."""
+    ) -> Callable[[Octets, memoryview | None], Octets | None] | None:
+        """The same for payloads that begin with the same 12 octets; a large one goes to the place given, if it fits."""
         ...

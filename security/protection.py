@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from ddsi.messages.fast import SENDER_AT
 from ddsi.messages.raw_submessage import SubmessageKind
 from ddsi.spi import NO_OVERHEAD, NOT_FOR_US, NoKeys, Octets, Outcome, Overhead, Parts, Refused, Rejected
 from ddsi.spi import Protection as Level
@@ -31,16 +32,6 @@ __all__ = ["Protection"]
 _CYCLONE_DDS: Final = VendorId(b"\x01\x10")
 _SUBMESSAGE_HEADER: Final = 4
 
-# Where in a submessage the entity stands that sent it.
-_SENDER: Final = {
-    int(SubmessageKind.DATA): _SUBMESSAGE_HEADER + 8,
-    int(SubmessageKind.DATA_FRAG): _SUBMESSAGE_HEADER + 8,
-    int(SubmessageKind.HEARTBEAT): _SUBMESSAGE_HEADER + 4,
-    int(SubmessageKind.HEARTBEAT_FRAG): _SUBMESSAGE_HEADER + 4,
-    int(SubmessageKind.GAP): _SUBMESSAGE_HEADER + 4,
-    int(SubmessageKind.ACKNACK): _SUBMESSAGE_HEADER,
-    int(SubmessageKind.NACK_FRAG): _SUBMESSAGE_HEADER,
-}
 _INFO_TS: Final = int(SubmessageKind.INFO_TS)
 _NOTHING: Parts = ()
 _NONE, _MESSAGE, _SUBMESSAGE = int(Level.NONE), int(Level.MESSAGE), int(Level.SUBMESSAGE)
@@ -62,6 +53,8 @@ _SMALL: Final = 1 << 12
 
 Encoder = Callable[[Parts], Parts | Refused]
 Opener = Callable[[Octets], Octets | None]
+PayloadOpener = Callable[[Octets, memoryview | None], Octets | None]
+EnvelopeOpener = Callable[[memoryview, int, int], tuple[Octets, int] | None]
 
 
 class Protection:
@@ -90,9 +83,9 @@ class Protection:
         self._short_ways = cryptographic if isinstance(cryptographic, OpensAlike) else None
         self._message_openers: dict[bytes, tuple[bytes, Opener, RemoteParticipant]] = {}
         """By source: what followed the header of its last message, and what opened it."""
-        self._openers: dict[bytes, tuple[Opener, Pair]] = {}
-        """By source and first octets of submessages: what opened the last of these, and whose they are."""
-        self._payload_openers: dict[Guid, tuple[bytes, Opener]] = {}
+        self._openers: dict[bytes, tuple[EnvelopeOpener, RemoteParticipant]] = {}
+        """By source and first octets of submessages: what opens the like of them, and whose they are."""
+        self._payload_openers: dict[Guid, tuple[bytes, PayloadOpener]] = {}
         """By remote writer: how its last payload began, and what opened it."""
         self._payload_pairs: dict[Guid, Pair | None] = {}
         """By remote writer: with whom it shares the key of its payloads; None where they are in clear."""
@@ -219,23 +212,16 @@ class Protection:
                 self._message_openers[source] = bytes(message[_RTPS_HEADER:_MESSAGES_ALIKE]), opener, remote
         return plain
 
-    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
-        if len(protected) < _SMALL:
-            protected = bytes(protected)
-        known = self._openers.get(source + protected[:_ALIKE])
-        if known is not None:
-            opener, pair = known
-            plain = opener(protected)
-            if plain is not None:
-                pair.participant.opened += 1
-                start = _SENDER.get(plain[0])
-                if start is not None and plain[start : start + 4] == pair.remote_entity:
-                    return plain
-                return plain if _names(plain, pair.remote_entity) else _speaks_for_another(pair)
-        return self._decode_submessage(protected, source)
+    def open_envelope(self, message: memoryview, start: int, end: int, source: bytes) -> tuple[Octets, int] | None:
+        known = self._openers.get(source + message[start : start + _ALIKE])
+        if known is None:
+            return None
+        opened = known[0](message, start, end)
+        if opened is not None:
+            known[1].opened += 1
+        return opened
 
-    def _decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
-        """The general way of :meth:`decode_submessage`, and of the first that each sender protects."""
+    def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         remote = self._remotes.get(source)
         if remote is None or remote.crypto is None:
             return _no_keys(protected, 0)
@@ -267,11 +253,11 @@ class Protection:
             # Only who shares the secret can have said that.  A peer may have no key for us (OpenDDS), but it answers.
             remote.handshake.confirm()
         if self._short_ways is not None and not pair.is_volatile:
-            opener = self._short_ways.submessage_opener(protected, sender)
+            opener = self._short_ways.submessage_opener(protected, sender, pair.remote_entity)
             if opener is not None:
                 if len(self._openers) >= _MOST_OPENERS:
                     self._openers.clear()
-                self._openers[source + bytes(protected[:_ALIKE])] = opener, pair
+                self._openers[source + bytes(protected[:_ALIKE])] = opener, remote
         return plain
 
     def _open_pair(self, sender: DatawriterCryptoHandle | DatareaderCryptoHandle) -> Pair | None:
@@ -281,12 +267,12 @@ class Protection:
             return pair
         return next((other for other in self._keys.by_remote[pair.remote] if other.is_open), None)
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         if len(payload) < _SMALL:
             payload = bytes(payload)
         known = self._payload_openers.get(writer)
         if known is not None and payload[:_PAYLOADS_ALIKE] == known[0]:
-            plain = known[1](payload)
+            plain = known[1](payload, place)
             if plain is not None:
                 return plain
         return self._decode_payload(writer, payload)
@@ -364,13 +350,13 @@ class Protection:
 
 def _names(submessage: Octets, entity: bytes) -> bool:
     """Is this the sender that a submessage names?  INFO_TS names none (Fast DDS)."""
-    start = _SENDER.get(submessage[0])
+    start = SENDER_AT.get(submessage[0])
     return submessage[0] == _INFO_TS if start is None else submessage[start : start + 4] == entity
 
 
 def _is_volatile(submessage: Octets) -> bool:
     """Is it of one of the two endpoints of the volatile topic?"""
-    start = _SENDER.get(submessage[0])
+    start = SENDER_AT.get(submessage[0])
     if start is None:
         return submessage[0] == _INFO_TS
     named = bytes(submessage[start : start + 4])

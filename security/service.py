@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from ddsi.serialization import ParameterId
 from ddsi.spi import (
@@ -119,6 +119,7 @@ class SecurityService:
         self.encode_message = protection.encode_message
         self.decode_message = protection.decode_message
         self.decode_submessage = protection.decode_submessage
+        self.open_envelope = protection.open_envelope
         self.decode_payload = protection.decode_payload
         self.protects_payload = protection.protects_payload
         self.opens_after_joining = protection.opens_after_joining
@@ -330,7 +331,8 @@ class SecurityService:
     encode_message: Callable[[tuple[Guid, ...], Parts], Parts]
     decode_message: Callable[[Octets, GuidPrefix], Octets | Outcome]
     decode_submessage: Callable[[Octets, GuidPrefix], Octets | Outcome]
-    decode_payload: Callable[[Guid, Octets], Octets | Outcome]
+    open_envelope: Callable[[memoryview, int, int, GuidPrefix], tuple[Octets, int] | None]
+    decode_payload: _DecodesPayload
     protects_payload: Callable[[Guid], bool]
     opens_after_joining: Callable[[Guid], bool]
     admits: Callable[[bytes, int], bool]
@@ -353,6 +355,10 @@ def _max_handshakes(properties: Properties) -> int:
     if not (value.isascii() and value.isdecimal() and 0 < len(value) < 7 and int(value)):
         raise ConfigurationError(f"property {HANDSHAKE_LIMIT} is {value!r}: give a whole number from 1 to 999999")
     return int(value)
+
+
+class _DecodesPayload(Protocol):
+    def __call__(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome: ...
 
 
 class _Factory:

@@ -101,7 +101,18 @@ class PartialSample:
             if not self._arrived[index]:
                 self._arrived[index] = 1
                 self._missing_count -= 1
-        self.octets[offset:end] = fragments[: end - offset]
+        if not (isinstance(fragments, memoryview) and fragments.obj is self.octets):
+            self.octets[offset:end] = fragments[: end - offset]
+
+    def place_of(self, first: int, count: int) -> memoryview | None:
+        """Where these fragments will lie, for who makes them; None if any of them is here.
+
+        Whatever is written there, they are here only when they are added.
+        """
+        if 1 in self._arrived[first - 1 : first - 1 + count]:
+            return None
+        size = self.fragment_size
+        return memoryview(self.octets)[(first - 1) * size : (first - 1 + count) * size]
 
     def missing(self, up_to: int | None = None) -> NumberSet:
         """The fragments that are not here, of those up to ``up_to`` (inclusive; all); at most 256 from the first."""
@@ -174,11 +185,12 @@ class Defragmenter:
         fragments: bytes | memoryview,
         now: float,
         is_sealed: bool = False,
+        begun: PartialSample | None = None,
     ) -> PartialSample | None:
         """Fragments of one sample: the sample as far as it is here now, or None when they were refused.
 
         When it :attr:`~PartialSample.is_complete` it is not held any more.  Sealed fragments and opened ones are never
-        joined.
+        joined.  ``begun``: of :meth:`begin`, if the fragments were put there.
         """
         sample = self._sample_for(sequence_number, reader_id)
         if sample is not None and not sample.is_like(sample_size, fragment_size, is_sealed=is_sealed):
@@ -188,13 +200,30 @@ class Defragmenter:
             self._remove(sequence_number, sample)
             sample = None
         if sample is None:
-            sample = self._start(sequence_number, reader_id, sample_size, fragment_size, is_sealed=is_sealed)
+            sample = self._start(sequence_number, reader_id, sample_size, fragment_size, begun, is_sealed=is_sealed)
             if sample is None:
                 return None
         sample.last_arrival = now
         sample.add(first, count, fragments)
         if sample.is_complete:
             self._remove(sequence_number, sample)
+        return sample
+
+    def begin(
+        self, sequence_number: int, reader_id: bytes, *, sample_size: int, fragment_size: int, count: int
+    ) -> PartialSample | None:
+        """The sample in whose octets ``count`` fragments may be put before it is known whether they are to be believed.
+
+        One that is not here yet is not held: it exists for these fragments alone until they are added, and only where
+        they are half of it at least, so that nobody makes us take more memory than he has sent octets.
+        """
+        samples = self._partial.get(sequence_number)
+        if samples is None:
+            is_large_part = 2 * count * fragment_size >= sample_size
+            return PartialSample(sample_size, fragment_size, bytes(reader_id)) if is_large_part else None
+        sample = samples.get(_TO_ALL) or samples.get(reader_id)
+        if sample is None or not sample.is_like(sample_size, fragment_size, is_sealed=False):
+            return None
         return sample
 
     def partial_for(self, reader_id: bytes) -> dict[int, PartialSample]:
@@ -243,7 +272,14 @@ class Defragmenter:
         return sample
 
     def _start(
-        self, number: int, reader_id: bytes, sample_size: int, fragment_size: int, *, is_sealed: bool
+        self,
+        number: int,
+        reader_id: bytes,
+        sample_size: int,
+        fragment_size: int,
+        begun: PartialSample | None,
+        *,
+        is_sealed: bool,
     ) -> PartialSample | None:
         octets = sample_size - (-sample_size // fragment_size)
         if octets > self._budget.max_octets:
@@ -256,7 +292,7 @@ class Defragmenter:
             heaviest = self._budget.heaviest()
             if not heaviest._give_way(number if heaviest is self else None):
                 return None
-        sample = PartialSample(sample_size, fragment_size, bytes(reader_id), is_sealed=is_sealed)
+        sample = begun or PartialSample(sample_size, fragment_size, bytes(reader_id), is_sealed=is_sealed)
         self._partial.setdefault(number, {})[sample.reader_id] = sample
         self._count += 1
         self.octets += sample.memory

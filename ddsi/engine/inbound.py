@@ -60,6 +60,7 @@ _UNKNOWN_PREFIX = bytes(12)
 _WITHOUT_EFFECT = frozenset({SubmessageKind.PAD, SubmessageKind.INFO_REPLY, SubmessageKind.INFO_REPLY_IP4})
 _LE_AND_QOS = 0x03
 _DATA_FRAG_FIXED = 32  # octets of its body before an inline QoS
+_WORTH_A_PLACE = 1 << 14  # octets of a run that are decrypted to where they belong, to spare a copy
 _KEY_HASH_QOS = 24  # octets of an inline QoS that holds a key hash alone
 _CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
 
@@ -104,7 +105,7 @@ class Inbound:
         self._hooks = engine.hooks
         self._handlers: dict[int, Callable[[Incoming, RawSubmessage], None]] = {
             SubmessageKind.DATA: self._general_data,
-            SubmessageKind.DATA_FRAG: self._data_frag,
+            SubmessageKind.DATA_FRAG: lambda incoming, raw: self._data_frag(incoming, raw.flags, raw.body),
             SubmessageKind.HEARTBEAT: self._heartbeat,
             SubmessageKind.HEARTBEAT_FRAG: self._heartbeat_frag,
             SubmessageKind.GAP: self._gap,
@@ -175,9 +176,8 @@ class Inbound:
             if kind == _DATA and flags == _LE_DATA_ONLY and length and position <= end and not length & 3:
                 if incoming.is_for_us:
                     self._data(incoming, view, body, position)
-            elif kind == _SEC_PREFIX and flags == 1 and length == 20 and (past := envelope_end(view, body - 4, end)):
-                self._envelope(incoming, view[body - 4 : past])
-                position = past
+            elif kind == _SEC_PREFIX and flags == 1 and length == 20:
+                position = self._usual_envelope(incoming, view, body - 4, end)
             elif (
                 kind == _DATA and flags == _LE_DATA_AND_QOS and length and position <= end and not length & 3
                 and (key_hash := key_hash_alone(view, body, position))
@@ -187,6 +187,8 @@ class Inbound:
             elif kind == _INFO_TS and flags == 1 and length == 8 and position <= end:
                 seconds, fraction = _TIMESTAMP.unpack_from(view, body)
                 incoming.timestamp = seconds << 32 | fraction
+            elif kind == _DATA_FRAG and flags & 1 and length and position <= end and not length & 3:
+                self._data_frag(incoming, flags, view[body:position])
             elif flags & 1 and length and position <= end and not length & 3 and (handler := handlers.get(kind)):
                 handler(incoming, RawSubmessage(kind, flags, view[body:position], body - 4))
             else:
@@ -214,6 +216,31 @@ class Inbound:
             raise MalformedMessage("an envelope without its end", element="SEC_PREFIX", offset=envelope_start)
         return len(view)
 
+    def _usual_envelope(self, incoming: Incoming, view: memoryview, start: int, end: int) -> int:
+        """A little-endian SEC_PREFIX is at ``view[start]``: returns where what follows its envelope begins."""
+        outside = incoming.protection
+        if not incoming.is_for_us or outside & _IN_ENVELOPE:
+            opened = None
+        else:
+            opened = self._hooks.open_envelope(view, start, end, incoming.prefix)
+        if opened is None:
+            past = envelope_end(view, start, end)
+            if not past:
+                return self._general_submessages(incoming, view, start)
+            self._envelope(incoming, view[start:past])
+            return past
+        submessage, past = opened
+        incoming.protection = outside | _IN_ENVELOPE
+        kind = submessage[0]
+        if kind == _DATA_FRAG:
+            self._data_frag(incoming, submessage[1], memoryview(submessage)[4:])
+        elif kind == _DATA and submessage[1] == _LE_DATA_ONLY:
+            self._data(incoming, submessage, 4, len(submessage))
+        else:
+            self._submessages(incoming, memoryview(submessage), 0)
+        incoming.protection = outside
+        return past
+
     def _envelope(self, incoming: Incoming, octets: memoryview) -> None:
         """SEC_PREFIX to SEC_POSTFIX: whose it is, is told by INFO_DST before anything is decrypted."""
         if not incoming.is_for_us:
@@ -226,15 +253,7 @@ class Inbound:
             self.undecodable(decoded, incoming.source)
             return
         incoming.protection = outside | _IN_ENVELOPE
-        length = len(decoded)
-        kind, flags, following = SUBMESSAGE_HEAD.unpack_from(decoded) if length > 4 else (0, 0, 0)
-        is_usual = following == length - 4 and flags & 1 and not length & 3
-        if is_usual and kind == _DATA and flags == _LE_DATA_ONLY:
-            self._data(incoming, decoded, 4, length)
-        elif is_usual and kind == _DATA_FRAG:
-            self._data_frag(incoming, RawSubmessage(kind, flags, memoryview(decoded)[4:], 0))
-        else:
-            self._submessages(incoming, memoryview(decoded), 0)
+        self._submessages(incoming, memoryview(decoded), 0)
         incoming.protection = outside
 
     def undecodable(self, outcome: Outcome, source: Locator | None) -> None:
@@ -323,7 +342,7 @@ class Inbound:
         if not incoming.is_for_us:
             return
         data = Data.decode(raw.flags, raw.body)
-        _check_number(data.writer_sn, raw)
+        _check_number(data.writer_sn, raw.kind, raw.offset)
         inline = InlineQos.read(data.inline_qos)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
@@ -471,14 +490,13 @@ class Inbound:
             reason = DropReason.UNKNOWN_WRITER
         self._engine.dropped(reason, incoming.source)
 
-    def _data_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
+    def _data_frag(self, incoming: Incoming, flags: int, body: memoryview) -> None:
         """One run of fragments: decoded and joined once, whoever reads it."""
         if not incoming.is_for_us:
             return
-        flags, body = raw.flags, raw.body
         key_hash = key_hash_alone(body, 0, len(body), _DATA_FRAG_FIXED) if flags & 3 == _LE_AND_QOS else b""
         data = DataFrag.decode(flags, body, inline_qos_octets=_KEY_HASH_QOS if key_hash else 0)
-        _check_number(data.writer_sn, raw)
+        _check_number(data.writer_sn, _DATA_FRAG)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
             self._unmatched(incoming, data.writer_id)
@@ -502,9 +520,18 @@ class Inbound:
         # protected as a whole (OpenDDS): it cannot be opened before the last fragment is here.
         run_length = data.run_length
         is_sealed = is_protected and len(data.serialized_payload) < run_length + 4
+        begun: PartialSample | None = None
         fragments: Octets | Outcome = data.serialized_payload
         if not is_sealed:
-            fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload)
+            place: memoryview | None = None
+            if is_protected and run_length >= _WORTH_A_PLACE:
+                begun = remote.defragmenter.begin(
+                    data.writer_sn, data.reader_id,
+                    sample_size=data.sample_size, fragment_size=data.fragment_size, count=data.fragments_in_submessage,
+                )  # fmt: skip
+                if begun is not None:
+                    place = begun.place_of(data.fragment_starting_num, data.fragments_in_submessage)
+            fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload, place)
         if isinstance(fragments, Outcome):
             self.undecodable(fragments, incoming.source)
             return
@@ -516,7 +543,7 @@ class Inbound:
             inline = InlineQos(key_hash=key_hash)
         elif data.inline_qos is not None:
             inline = InlineQos.read(data.inline_qos)
-        self._add_fragments(incoming, remote, data, memoryview(fragments), inline, is_sealed=is_sealed)
+        self._add_fragments(incoming, remote, data, memoryview(fragments), inline, is_sealed=is_sealed, begun=begun)
 
     def _not_cdr(self, incoming: Incoming, remote: RemoteWriter, data: Data | DataFrag) -> None:
         """Flag N.  RTPS 2.5 §8.3.8.2: only who has agreed on such a payload can read it."""
@@ -540,6 +567,7 @@ class Inbound:
         inline: InlineQos | None,
         *,
         is_sealed: bool,
+        begun: PartialSample | None = None,
     ) -> None:
         defragmenter = remote.defragmenter
         dropped = defragmenter.dropped
@@ -553,6 +581,7 @@ class Inbound:
             fragments=fragments,
             now=incoming.now,
             is_sealed=is_sealed,
+            begun=begun,
         )
         if defragmenter.dropped != dropped:
             self._engine.dropped(DropReason.TABLE_FULL_FRAGMENTS, incoming.source)
@@ -602,7 +631,7 @@ class Inbound:
 
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
-        _check_number(heartbeat.last_sn, raw)
+        _check_number(heartbeat.last_sn, raw.kind, raw.offset)
         restarted = False
         pairs = self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id)
         for local, proxy in pairs:
@@ -631,7 +660,7 @@ class Inbound:
     def _heartbeat_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         """RTPS 2.5 §8.3.8.7: ask at once for fragments that should be here.  Ignored for samples of which none is."""
         heartbeat = HeartbeatFrag.decode(raw.flags, raw.body)
-        _check_number(heartbeat.writer_sn, raw)
+        _check_number(heartbeat.writer_sn, raw.kind, raw.offset)
         if not self._may_ask(incoming, _WORK_OF_A_FRAGMENTED_SAMPLE):
             return
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
@@ -640,7 +669,7 @@ class Inbound:
 
     def _gap(self, incoming: Incoming, raw: RawSubmessage) -> None:
         gap = Gap.decode(raw.flags, raw.body)
-        _check_number(max(gap.gap_start, gap.gap_list.end), raw)
+        _check_number(max(gap.gap_start, gap.gap_list.end), raw.kind, raw.offset)
         if not self._may_ask(incoming, gap.gap_list.bitmap.bit_count()):
             return
         for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
@@ -661,7 +690,7 @@ class Inbound:
 
     def _acknack(self, incoming: Incoming, raw: RawSubmessage) -> None:
         acknack = AckNack.decode(raw.flags, raw.body)
-        _check_number(acknack.reader_sn_state.end, raw)
+        _check_number(acknack.reader_sn_state.end, raw.kind, raw.offset)
         if not incoming.is_for_us:
             return
         writer = self._engine.local_writers.get(Guid(self._own_prefix + acknack.writer_id))
@@ -685,7 +714,7 @@ class Inbound:
 
     def _nack_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         nack = NackFrag.decode(raw.flags, raw.body)
-        _check_number(nack.writer_sn, raw)
+        _check_number(nack.writer_sn, raw.kind, raw.offset)
         if not incoming.is_for_us:
             return
         writer = self._engine.local_writers.get(Guid(self._own_prefix + nack.writer_id))
@@ -705,6 +734,6 @@ class Inbound:
         self._engine.writer_answers(writer, answers)
 
 
-def _check_number(number: int, raw: RawSubmessage) -> None:
+def _check_number(number: int, kind: int, offset: int = 0) -> None:
     if number >= NUMBERS_END:
-        raise MalformedMessage(f"no writer reaches {number}", element=submessage_name(raw.kind), offset=raw.offset)
+        raise MalformedMessage(f"no writer reaches {number}", element=submessage_name(kind), offset=offset)

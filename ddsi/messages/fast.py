@@ -13,6 +13,7 @@ from .raw_submessage import SubmessageKind
 
 __all__ = [
     "DATA_BODY",
+    "SENDER_AT",
     "SUBMESSAGE_HEAD",
     "data_frag_head",
     "data_head",
@@ -37,6 +38,17 @@ SUBMESSAGE_HEAD = struct.Struct("<BBH")
 """kind, flags, octetsToNextHeader."""
 DATA_BODY = struct.Struct("<HH4s4siI")
 """extraFlags, octetsToInlineQos, readerId, writerId, writerSN (high, low)."""
+
+SENDER_AT = {
+    int(SubmessageKind.DATA): 12,
+    int(SubmessageKind.DATA_FRAG): 12,
+    int(SubmessageKind.HEARTBEAT): 8,
+    int(SubmessageKind.HEARTBEAT_FRAG): 8,
+    int(SubmessageKind.GAP): 8,
+    int(SubmessageKind.ACKNACK): 4,
+    int(SubmessageKind.NACK_FRAG): 4,
+}
+"""Where in a submessage, its header included, the id of the entity stands that sent it."""
 
 
 def timestamp(ticks: int) -> bytes:

@@ -197,6 +197,9 @@ class VendorHooks:
         decoded = self._hooks.decode_message(message, source)
         return decoded if isinstance(decoded, Outcome) else self.understood(decoded)
 
+    def open_envelope(self, message: memoryview, start: int, end: int, source: bytes) -> tuple[Octets, int] | None:
+        return None  # all come through decode_submessage
+
     def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         decoded = self._hooks.decode_submessage(protected, source)
         if isinstance(decoded, Outcome):

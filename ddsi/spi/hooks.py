@@ -301,9 +301,20 @@ class SecurityHooks(Protocol):
         """Undo :meth:`encode_submessage`: SEC_PREFIX to SEC_POSTFIX in, the submessage out (§8.5.1.9.6-8)."""
         ...
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def open_envelope(self, message: memoryview, start: int, end: int, source: bytes) -> tuple[Octets, int] | None:
+        """A short way of :meth:`decode_submessage` for envelopes that are like one which that has opened.
+
+        SEC_PREFIX, little-endian, is at ``message[start]``, and the message ends at ``end``.  What comes back is the
+        submessage, which is little-endian and has its length, and where the envelope ends.  None, and ``message`` as it
+        was: there is no short way for it.
+        """
+        ...
+
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         """Undo :meth:`encode_payload` (§8.5.1.9.9).
 
+        ``place``: where a plain text that is so long belongs.  It may be put there, and then that is what is returned;
+        until it is, anything may be written there.
         Empty where nothing but a key hash in clear says that an instance has ended: is that believed, of this writer?
         """
         ...

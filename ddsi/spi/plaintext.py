@@ -112,7 +112,10 @@ class Plaintext:
     def decode_submessage(self, protected: Octets, source: bytes) -> Octets | Outcome:
         return NOT_FOR_US
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def open_envelope(self, message: memoryview, start: int, end: int, source: bytes) -> tuple[Octets, int] | None:
+        return None
+
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         return payload
 
     def protects_payload(self, writer: Guid) -> bool:

@@ -18,10 +18,11 @@ from typing import Final
 from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
+from ddsi.messages.fast import SENDER_AT
 from ddsi.spi import Octets, Outcome
 
 from .aes_gcm import LARGE, decrypter_into
-from .envelope import ENVELOPE_KINDS, HEAD, MESSAGE, SUBMESSAGE, Envelope, body_head
+from .envelope import HEAD, MESSAGE, SUBMESSAGE, Envelope, body_head
 from .opening import INFO_SRC_HEADS, as_message, with_header
 from .received_keys import KeyRing, ReceivedSession
 from .rooms import Rooms
@@ -51,6 +52,13 @@ _LEAST_SIGNED: Final = _SIGNED_AT + 24 + _FOOT
 _AROUND: Final = _CONTENT_AT + _FOOT
 """Octets around what is encrypted."""
 _LEAST: Final = _AROUND + 4
+_AFTER_MAC: Final = len(_NO_MACS) + 4
+"""What of the postfix lies behind the MAC while it is where AES-GCM wants it: that is where the header was."""
+_LENGTH: Final = struct.Struct("<H")
+_LENGTH_AT: Final = _BODY_AT + 2
+"""Of SEC_BODY."""
+_AROUND_BODY: Final = _BODY_AT + HEAD.size + _FOOT
+"""Octets of an envelope beside those that this length counts."""
 
 _PAYLOAD_HEAD: Final = struct.Struct(">8x12sI")
 """The nonce, and how many octets were encrypted."""
@@ -69,18 +77,18 @@ class _Encrypted:
         self._decrypt_into = decrypter_into(aead)
         self._room = rooms.room
 
-    def content(self, octets: Octets) -> Octets | None:
-        """What lies in the envelope; else None, and the octets are as they were.
+    def content(self, octets: Octets, start: int, end: int) -> Octets | None:
+        """What lies in the envelope ``octets[start:end]``; else None, and the octets are as they were.
 
         None also where they were altered: the general way says in what.
         """
-        length = len(octets)
+        length = end - start
         if length >= LARGE:
-            return self._large_content(memoryview(octets))
+            return self._large_content(memoryview(octets), start, end)
         if length < _LEAST:
             return None
         take_apart, expected_head = _layout(length)
-        nonce, head, cipher_text, postfix_head, mac, count = take_apart(octets)
+        nonce, head, cipher_text, postfix_head, mac, count = take_apart(octets, start)
         if head != expected_head or postfix_head != self._postfix_head or count != _NO_MACS:
             return None
         try:
@@ -88,68 +96,76 @@ class _Encrypted:
         except InvalidTag:
             return None
 
-    def _large_content(self, octets: memoryview) -> Octets | None:
+    def _large_content(self, octets: memoryview, start: int, end: int) -> Octets | None:
         """Without copying, where ``octets`` can be written to: the MAC goes for a while to where AES-GCM wants it."""
-        length = len(octets)
-        if length < _LEAST:
-            return None
-        take_apart, expected_head = _large_layout(length)
-        nonce, head, postfix_head, mac, count = take_apart(octets)
+        take_apart, expected_head = _large_layout(end - start)
+        nonce, head, postfix_head, mac, count = take_apart(octets, start)
         if head != expected_head or postfix_head != self._postfix_head or count != _NO_MACS:
             return None
         if octets.readonly:
-            sealed: Octets = b"".join((octets[_CONTENT_AT:-_FOOT], mac))
+            sealed: Octets = b"".join((octets[start + _CONTENT_AT : end - _FOOT], mac))
         else:
-            octets[-_FOOT : MAC_LENGTH - _FOOT] = mac
-            sealed = octets[_CONTENT_AT : MAC_LENGTH - _FOOT]
-        room = self._room(length - _AROUND)
+            octets[end - _FOOT : end - _AFTER_MAC] = mac
+            sealed = octets[start + _CONTENT_AT : end - _AFTER_MAC]
+        room = self._room(end - start - _AROUND)
         try:
             self._decrypt_into(nonce, sealed, None, room)
         except InvalidTag:
-            self._put_back(octets)
+            self._put_back(octets, start, end)
             return None
         return room
 
-    def _put_back(self, octets: Octets) -> None:
+    def _put_back(self, octets: Octets, start: int, end: int) -> None:
         """The general way is to find the octets as they were: the MAC goes back to its place."""
-        view = memoryview(octets)
+        view = memoryview(octets)[start:end]
         if not view.readonly and len(view) >= LARGE:
-            mac = bytes(view[-_FOOT : MAC_LENGTH - _FOOT])
+            mac = bytes(view[-_FOOT:-_AFTER_MAC])
             view[-_FOOT:] = b"".join((self._postfix_head, mac, _NO_MACS))
 
 
 # Few lengths are in use at a time, and one call that takes all apart is quicker than a slice for each.
 @lru_cache(maxsize=256)
-def _layout(length: int) -> tuple[Callable[[Octets], tuple[bytes, ...]], bytes]:
+def _layout(length: int) -> tuple[Callable[[Octets, int], tuple[bytes, ...]], bytes]:
     """Of an envelope with so many octets: its parts, from the nonce on, and the head of SEC_BODY as it must be."""
     content = length - _CONTENT_AT - _FOOT
     parts = struct.Struct(f"{_NONCE_AT}x12s8s{content}s4s{MAC_LENGTH}s4s")
-    return parts.unpack, b"" if length & 3 else body_head(content)
+    return parts.unpack_from, b"" if length & 3 else body_head(content)
 
 
 @lru_cache(maxsize=256)
-def _large_layout(length: int) -> tuple[Callable[[Octets], tuple[bytes, ...]], bytes]:
+def _large_layout(length: int) -> tuple[Callable[[Octets, int], tuple[bytes, ...]], bytes]:
     """The same without the content, which stays where it is."""
     content = length - _CONTENT_AT - _FOOT
     parts = struct.Struct(f"{_NONCE_AT}x12s8s{content}x4s{MAC_LENGTH}s4s")
-    return parts.unpack, b"" if length & 3 else body_head(content)
+    return parts.unpack_from, b"" if length & 3 else body_head(content)
 
 
 class SubmessageOpener(_Encrypted):
-    """For submessages."""
+    """For submessages of the entity with this id."""
 
-    __slots__ = ()
+    __slots__ = ("_entity_id",)
 
-    def open(self, octets: Octets) -> Octets | None:
-        """The one submessage in ``octets``, little-endian and with its length; else None, and they are as they were."""
-        plain = self.content(octets)
+    def __init__(self, entity_id: bytes, aead: AESGCM, rooms: Rooms) -> None:
+        super().__init__(SUBMESSAGE, aead, rooms)
+        self._entity_id = entity_id
+
+    def open(self, octets: Octets, start: int, end: int) -> tuple[Octets, int] | None:
+        """The one submessage in the envelope at ``octets[start]``, little-endian and with its length, and where the
+        envelope ends, at most at ``end``; else None, and the octets are as they were."""
+        if end - start < _LEAST:
+            return None
+        past = start + _AROUND_BODY + _LENGTH.unpack_from(octets, start + _LENGTH_AT)[0]
+        if past > end:
+            return None
+        plain = self.content(octets, start, past)
         if plain is None:
             return None
-        kind, flags, following = HEAD.unpack_from(plain)
-        if not flags & 1 or following != len(octets) - _LEAST or kind in ENVELOPE_KINDS:
-            self._put_back(octets)
+        kind, flags, length = HEAD.unpack_from(plain)
+        at = SENDER_AT.get(kind)
+        if at is None or not flags & 1 or length != past - start - _LEAST or plain[at : at + 4] != self._entity_id:
+            self._put_back(octets, start, past)
             return None
-        return plain
+        return plain, past
 
 
 class MessageOpener(_Encrypted):
@@ -160,13 +176,12 @@ class MessageOpener(_Encrypted):
     def open(self, octets: Octets) -> Octets | None:
         """The message, with its header; else None, and ``octets`` are as they were."""
         octets = bytes(octets) if len(octets) < LARGE else memoryview(octets)
-        envelope = octets[_RTPS_HEADER:]
-        plain = self.content(envelope)
+        plain = self.content(octets, _RTPS_HEADER, len(octets))
         if plain is None:
             return None
         message = as_message(plain, octets)
         if isinstance(message, Outcome):
-            self._put_back(envelope)
+            self._put_back(octets, _RTPS_HEADER, len(octets))
             return None
         return message
 
@@ -211,8 +226,11 @@ class PayloadOpener:
         self._decrypt_into = decrypter_into(aead)
         self._room = rooms.room
 
-    def open(self, octets: Octets) -> Octets | None:
-        """The payload in ``octets``, behind which is no padding; else None, also where they were altered."""
+    def open(self, octets: Octets, place: memoryview | None = None) -> Octets | None:
+        """The payload in ``octets``, behind which is no padding; else None, also where they were altered.
+
+        If it is large, it is put to ``place`` where that is as long as it is.
+        """
         length = len(octets)
         content = length - _PAYLOAD_CONTENT_AT - _PAYLOAD_FOOT
         if content < 0:
@@ -224,7 +242,7 @@ class PayloadOpener:
         try:
             if length < LARGE:
                 return self._decrypt(nonce, sealed, None)
-            room = self._room(content)
+            room = place if place is not None and len(place) == content else self._room(content)
             self._decrypt_into(nonce, sealed, None, room)
             return room
         except InvalidTag:
@@ -247,12 +265,14 @@ def message_opener(
     return SignedMessageOpener(session.aead)
 
 
-def submessage_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> SubmessageOpener | None:
+def submessage_opener(
+    octets: Octets, ring: KeyRing, expected: Protection | None, entity_id: bytes
+) -> SubmessageOpener | None:
     """As :func:`message_opener`, of a submessage that is encrypted."""
     session = _session(octets[4:16], ring, expected)
     if session is None or expected is None or not expected.encrypted or octets[:4] != SUBMESSAGE.prefix_head:
         return None
-    return SubmessageOpener(SUBMESSAGE, session.aead, ring.rooms)
+    return SubmessageOpener(entity_id, session.aead, ring.rooms)
 
 
 def payload_opener(octets: Octets, ring: KeyRing, expected: Protection | None) -> PayloadOpener | None:

@@ -182,17 +182,18 @@ class AesGcmGmacTransform:
         self,
         encoded_rtps_submessage: Octets,
         sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
-    ) -> Callable[[Octets], Octets | None] | None:
+        entity_id: bytes,
+    ) -> Callable[[memoryview, int, int], tuple[Octets, int] | None] | None:
         """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.OpensAlike`."""
         sender = sending_crypto
         assert isinstance(sender, RemoteWriter | RemoteReader)
         expected = sender.reader.submessage if isinstance(sender, RemoteWriter) else sender.writer.submessage
-        opener = openers.submessage_opener(encoded_rtps_submessage, sender.ring, expected)
+        opener = openers.submessage_opener(encoded_rtps_submessage, sender.ring, expected, entity_id)
         return None if opener is None else opener.open
 
     def payload_opener(
         self, encoded_buffer: Octets, sending_datawriter_crypto: DatawriterCryptoHandle
-    ) -> Callable[[Octets], Octets | None] | None:
+    ) -> Callable[[Octets, memoryview | None], Octets | None] | None:
         """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.OpensAlike`."""
         sender = sending_datawriter_crypto
         assert isinstance(sender, RemoteWriter)

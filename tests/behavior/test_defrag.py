@@ -315,3 +315,57 @@ def test_when_missing_fragments_are_asked_for(
     sample = PartialSample(30, 10)
     sample.last_arrival, sample.asked_at = last_arrival, asked_at
     assert sample.is_silent(now, may_repeat=may_repeat) is expected
+
+
+# --- fragments that are made where they belong -----------------------------------------------------------------------
+
+
+def test_what_was_begun_for_fragments_is_held_once_they_are_added() -> None:
+    defrag = defragmenter()
+    begun = defrag.begin(1, TO_ALL, sample_size=30, fragment_size=10, count=2)
+    assert begun is not None
+    place = begun.place_of(1, 2)
+    assert place is not None
+    assert (len(place), len(defrag), defrag.octets) == (20, 0, 0)
+    place[:] = b"\1" * 10 + b"\2" * 10
+    sample = defrag.add(
+        1, TO_ALL, sample_size=30, fragment_size=10, first=1, count=2, fragments=place, now=0.0, begun=begun
+    )
+    assert sample is begun
+    assert (len(defrag), defrag.octets) == (1, begun.memory)
+    sample = add(defrag, 1, 3)
+    assert is_complete(sample)
+    assert sample is begun
+    assert bytes(begun.octets) == b"\1" * 10 + b"\2" * 10 + b"\3" * 10
+
+
+def test_nothing_is_begun_for_less_than_half_a_sample() -> None:
+    defrag = defragmenter()
+    assert defrag.begin(1, TO_ALL, sample_size=1 << 40, fragment_size=65_000, count=1) is None
+    assert defrag.begin(1, TO_ALL, sample_size=30, fragment_size=10, count=1) is None
+    assert defrag.begin(1, TO_ALL, sample_size=20, fragment_size=10, count=1) is not None
+
+
+def test_a_place_is_given_of_what_is_not_here_alone() -> None:
+    defrag = defragmenter()
+    add(defrag, 1, 2)
+    begun = defrag.begin(1, R1, sample_size=30, fragment_size=10, count=1)
+    assert begun is not None
+    assert [begun.place_of(first, count) is not None for first, count in ((1, 1), (2, 1), (3, 1), (1, 2), (2, 2))] == [
+        True, False, True, False, False,
+    ]  # fmt: skip
+    place = begun.place_of(3, 1)
+    assert place is not None
+    place[:] = b"anything.."  # it turned out not to be genuine, and was not added
+    assert not is_complete(add(defrag, 1, 1))
+    assert is_complete(add(defrag, 1, 3))
+    assert bytes(begun.octets) == b"\1" * 10 + b"\2" * 10 + b"\3" * 10
+
+
+def test_nothing_is_begun_of_what_contradicts_or_is_for_another() -> None:
+    defrag = defragmenter()
+    add(defrag, 1, 2, reader=R1)
+    assert defrag.begin(1, R1, sample_size=40, fragment_size=10, count=3) is None
+    assert defrag.begin(1, R2, sample_size=30, fragment_size=10, count=2) is None
+    add(defrag, 2, 2, sealed=True)
+    assert defrag.begin(2, TO_ALL, sample_size=30, fragment_size=10, count=2) is None

@@ -390,7 +390,7 @@ class Masking(Hooks):
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
         return payload if writer.entity_id.is_builtin else _inverted(payload)
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         return payload if writer.entity_id.is_builtin else _inverted(payload)
 
     def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
@@ -639,7 +639,7 @@ class Sealing(Masking):
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
         return payload if writer.entity_id.is_builtin else _inverted(payload) + bytes(40)
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         if writer.entity_id.is_builtin:
             return payload
         return _inverted(payload[:-40]) if bytes(payload[-40:]) == bytes(40) else Rejected("the MAC is wrong")
@@ -681,7 +681,7 @@ def test_a_sample_may_be_protected_by_fragments_or_as_a_whole(size: int, loss: f
 class Joining(Sealing):
     """Opens what it has joined: a run that was protected by itself is of no use to it."""
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         is_run = len(payload) < 5000 and not writer.entity_id.is_builtin
         return Rejected("a part of a sample") if is_run else super().decode_payload(writer, payload)
 

@@ -243,7 +243,7 @@ class XorSecurity(Plaintext):
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
         return payload if writer.entity_id.is_builtin else _xor(payload, 0x5A)
 
-    def decode_payload(self, writer: Guid, payload: Octets) -> Octets | Outcome:
+    def decode_payload(self, writer: Guid, payload: Octets, place: memoryview | None = None) -> Octets | Outcome:
         return payload if writer.entity_id.is_builtin else _xor(payload, 0x5A)
 
     def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:

@@ -6,6 +6,7 @@ import struct
 
 import pytest
 
+from ddsi.spi import Octets
 from ddsi_security.cryptographic.aes_gcm import LARGE
 from ddsi_security.cryptographic.openers import (
     MessageOpener,
@@ -36,19 +37,29 @@ def sealed(plain: bytes, key: SendingKey) -> bytes:
     return octets_of(seal_submessage((plain,), key, ()))
 
 
-def opener_of(first: bytes, keys: KeyRing) -> SubmessageOpener:
+def opener_of(first: bytes, keys: KeyRing, entity_id: bytes = bytes(4)) -> SubmessageOpener:
     assert open_submessage(first, keys, ENCRYPTED) is not None
-    found = submessage_opener(first, keys, ENCRYPTED)
+    found = submessage_opener(first, keys, ENCRYPTED, entity_id)
     assert found is not None
     return found
 
 
-@pytest.mark.parametrize("size", SIZES)
+def opened(opener: SubmessageOpener, octets: Octets) -> Octets | None:
+    """What is in the envelope that these are."""
+    found = opener.open(octets, 0, len(octets))
+    if found is None:
+        return None
+    plain, past = found
+    assert past == len(octets)
+    return plain
+
+
+@pytest.mark.parametrize("size", [24, *SIZES[1:]])
 @pytest.mark.parametrize("kind", [bytes, bytearray, lambda octets: memoryview(bytearray(octets)), memoryview])
 def test_it_opens_what_follows_in_the_same_session(size: int, kind: type) -> None:
     keys, key = ring(material()), sending_key()
     opener = opener_of(sealed(submessage(24), key), keys)
-    found = opener.open(kind(sealed(submessage(size), key)))
+    found = opened(opener, kind(sealed(submessage(size), key)))
     assert found is not None
     assert bytes(found) == submessage(size)
 
@@ -61,8 +72,8 @@ def test_what_was_altered_is_left_to_the_general_way_and_as_it_was(size: int, at
     altered = bytearray(sealed(submessage(max(size, 16)), key))
     altered[at] ^= 1
     before = bytes(altered)
-    assert opener.open(altered) is None
-    assert opener.open(before) is None
+    assert opened(opener, altered) is None
+    assert opened(opener, before) is None
     assert altered == before
 
 
@@ -71,8 +82,8 @@ def test_octets_that_end_too_soon_are_none(length: int) -> None:
     keys, key = ring(material()), sending_key()
     opener = opener_of(sealed(submessage(24), key), keys)
     octets = sealed(submessage(24), key)
-    assert opener.open(octets[:length]) is None
-    assert opener.open(octets[-length:]) is None
+    assert opened(opener, octets[:length]) is None
+    assert opened(opener, octets[-length:]) is None
 
 
 @pytest.mark.parametrize(
@@ -88,7 +99,41 @@ def test_octets_that_end_too_soon_are_none(length: int) -> None:
 def test_unusual_submessages_are_left_to_the_general_way(plain: bytes) -> None:
     keys, key = ring(material()), sending_key()
     opener = opener_of(sealed(submessage(24), key), keys)
-    assert opener.open(sealed(plain, key)) is None
+    assert opened(opener, sealed(plain, key)) is None
+
+
+@pytest.mark.parametrize("size", SIZES[1:])
+def test_it_opens_what_lies_in_the_middle_of_a_message(size: int) -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    envelope = sealed(submessage(size), key)
+    message = memoryview(bytearray(b"before" + envelope + b"behind"))
+    end = 6 + len(envelope)
+    for last in (end, len(message)):
+        found = opener.open(memoryview(bytearray(message)), 6, last)
+        assert found is not None
+        assert (bytes(found[0]), found[1]) == (submessage(size), end)
+    before = bytes(message)
+    assert opener.open(message, 6, end - 1) is None
+    assert message == before
+
+
+@pytest.mark.parametrize("size", SIZES[1:])
+@pytest.mark.parametrize("kind", [0x15, 0x16, 0x07, 0x13, 0x08, 0x06, 0x12])
+def test_it_opens_nothing_that_names_another_sender(size: int, kind: int) -> None:
+    keys, key = ring(material()), sending_key()
+    first = sealed(submessage(24), key)
+    octets = memoryview(bytearray(sealed(submessage(size, kind), key)))
+    before = bytes(octets)
+    assert opened(opener_of(first, keys, b"\0\0\1\2"), octets) is None
+    assert octets == before
+    assert opened(opener_of(first, keys), octets) == submessage(size, kind)
+
+
+def test_what_names_no_sender_is_left_to_the_general_way() -> None:
+    keys, key = ring(material()), sending_key()
+    opener = opener_of(sealed(submessage(24), key), keys)
+    assert opened(opener, sealed(submessage(12, kind=0x09), key)) is None
 
 
 def test_the_general_way_opens_large_ones_that_are_big_endian() -> None:
@@ -97,34 +142,34 @@ def test_the_general_way_opens_large_ones_that_are_big_endian() -> None:
     plain = struct.pack(">BBH", 0x15, 4, 40_000) + bytes(40_000)
     octets = memoryview(bytearray(sealed(plain, key)))
     before = bytes(octets)
-    assert opener.open(octets) is None
+    assert opened(opener, octets) is None
     assert octets == before
     assert open_submessage(octets, keys, ENCRYPTED) == plain
 
 
 def test_there_is_none_where_more_is_asked_for_than_encryption_for_all() -> None:
     keys, first = ring(material()), sealed(submessage(24), sending_key())
-    assert submessage_opener(first, keys, ENCRYPTED) is None, "nothing was opened in this session yet"
+    assert submessage_opener(first, keys, ENCRYPTED, bytes(4)) is None, "nothing was opened in this session yet"
     assert open_submessage(first, keys, ENCRYPTED) is not None
-    assert submessage_opener(first, keys, ENCRYPTED) is not None
-    assert submessage_opener(first, keys, None) is None
-    assert submessage_opener(first, keys, Protection(encrypted=False)) is None
-    assert submessage_opener(first, keys, Protection(encrypted=True, origin_authenticated=True)) is None
-    assert submessage_opener(first[:8] + b"\x99" * 4 + first[12:], keys, ENCRYPTED) is None
+    assert submessage_opener(first, keys, ENCRYPTED, bytes(4)) is not None
+    assert submessage_opener(first, keys, None, bytes(4)) is None
+    assert submessage_opener(first, keys, Protection(encrypted=False), bytes(4)) is None
+    assert submessage_opener(first, keys, Protection(encrypted=True, origin_authenticated=True), bytes(4)) is None
+    assert submessage_opener(first[:8] + b"\x99" * 4 + first[12:], keys, ENCRYPTED, bytes(4)) is None
 
 
 def test_there_is_none_while_a_key_is_being_replaced() -> None:
     keys, first = ring(material()), sealed(submessage(24), sending_key())
     assert open_submessage(first, keys, ENCRYPTED) is not None
     keys.replace(material(TransformationKind.AES256_GMAC))
-    assert submessage_opener(first, keys, ENCRYPTED) is None
+    assert submessage_opener(first, keys, ENCRYPTED, bytes(4)) is None
 
 
 def test_there_is_none_for_what_is_signed() -> None:
     of = material(TransformationKind.AES256_GMAC)
     keys, signed = ring(of), sealed(submessage(24), sending_key(of))
     assert open_submessage(signed, keys, Protection(encrypted=False)) == submessage(24)
-    assert submessage_opener(signed, keys, Protection(encrypted=False)) is None
+    assert submessage_opener(signed, keys, Protection(encrypted=False), bytes(4)) is None
 
 
 # --- messages --------------------------------------------------------------------------------------------------------
