@@ -26,7 +26,7 @@ WE_BEGIN, PEER_BEGINS = "encrypt-all", "encrypt-all-reversed"
         ("1.0+Final", 2, WE_BEGIN, CYCLONE_C),
         ("1.0+Final", 1, PEER_BEGINS, FAST_DDS),
         # Not the final of Cyclone DDS: where RTPS messages are protected it sends that once, whatever becomes of it.
-        # Only while it works on the reply, for two milliseconds, would it answer another, and mostly in one datagram.
+        # Only while it works on the reply, for two milliseconds, would it answer another, and often in one datagram.
     ],
 )
 @async_test
