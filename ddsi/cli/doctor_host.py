@@ -24,7 +24,7 @@ __all__ = ["host_findings"]
 
 _WANTED_FRAGMENT_MEMORY = 4 << 20
 _FRAGMENT_MEMORY_WHERE_SOME_ARE_LOST = 128 << 20
-_LOST_FRAGMENTS = 0.01  # so large a part of those that came shows that it is no accident
+_LOST_FRAGMENTS = 0.01  # so many failures for each that came show that it is no accident
 _MOST_NAMED = 8
 
 
@@ -84,7 +84,7 @@ def _fragments(largest: int, interfaces: Iterable[Interface]) -> Finding:
     """
     came, lost = reassembly_counts() or (0, 0)
     if lost > came * _LOST_FRAGMENTS:
-        text = f"{lost} of {came} IP fragments that came to this host could not be joined to datagrams"
+        text = f"{came} IP fragments came to this host, and {lost} times they could not be joined to a datagram"
         advice = (
             "find where frames are lost, let the peers send smaller messages, or "
             f"sysctl -w net.ipv4.ipfrag_high_thresh={_FRAGMENT_MEMORY_WHERE_SOME_ARE_LOST} net.ipv4.ipfrag_time=3"

@@ -206,7 +206,7 @@ def test_fragments_of_others_that_were_in_vain(
     monkeypatch.setattr(doctor_host, "reassembly_counts", lambda: (came, lost))
     finding = doctor_host._fragments(1400, [NOWHERE])
     assert finding.verdict == verdict
-    assert ("11616 of 15033 IP fragments" in finding.text) == (verdict == "warning")
+    assert ("15033 IP fragments came to this host, and 11616 times" in finding.text) == (verdict == "warning")
     assert ("ipfrag_time" in finding.advice) == (verdict == "warning")
 
 
