@@ -38,7 +38,8 @@ class Keep(Enum):
 class PartialSample:
     """A sample of which some fragments are here.  Fragment numbers count from 1.
 
-    ``reader_id``: the reader that it is for, UNKNOWN (zeros) for all.  ``is_sealed``: what is joined is the protected
+    ``memory``: octets that it occupies, those of the sample and one for each fragment.  ``reader_id``: the reader that
+    it is for, UNKNOWN (zeros) for all.  ``is_sealed``: what is joined is the protected
     form of the sample, which can be opened only when it is complete.
     """
 
@@ -50,6 +51,7 @@ class PartialSample:
         "inline_qos",
         "is_sealed",
         "last_arrival",
+        "memory",
         "octets",
         "reader_id",
         "timestamp",
@@ -64,6 +66,7 @@ class PartialSample:
         self.is_sealed = is_sealed
         self._missing_count = -(-sample_size // fragment_size)
         self._arrived = bytearray(self._missing_count)
+        self.memory = sample_size + self._missing_count
         self.inline_qos: object | None = None
         self.timestamp: int | None = None
         self.last_arrival = -math.inf
@@ -74,17 +77,12 @@ class PartialSample:
         return len(self._arrived)
 
     @property
-    def memory(self) -> int:
-        """Octets that it occupies: the sample, and one for each fragment."""
-        return len(self.octets) + len(self._arrived)
-
-    @property
     def is_complete(self) -> bool:
         return self._missing_count == 0
 
     def is_like(self, sample_size: int, fragment_size: int, *, is_sealed: bool) -> bool:
         """May fragments that say so belong to it?"""
-        return (len(self.octets), self.fragment_size, self.is_sealed) == (sample_size, fragment_size, is_sealed)
+        return self.fragment_size == fragment_size and len(self.octets) == sample_size and self.is_sealed is is_sealed
 
     def is_silent(self, now: float, *, may_repeat: bool) -> bool:
         """Is it time to ask for what is missing: nothing has come for a moment, nor is an answer under way?"""

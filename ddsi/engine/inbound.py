@@ -17,8 +17,8 @@ from ..behavior.writer_proxy import WriterProxy
 from ..discovery.participant_proxy import ParticipantProxy
 from ..messages.acknack import AckNack, NackFrag
 from ..messages.data import Data
-from ..messages.data_frag import DataFrag
 from ..messages.fast import DATA_BODY, SUBMESSAGE_HEAD, envelope_end, key_hash_alone
+from ..messages.fragment_run import FragmentRun
 from ..messages.gap import Gap
 from ..messages.heartbeat import Heartbeat, HeartbeatFrag
 from ..messages.interpreter import InfoDestination, InfoSource, InfoTimestamp
@@ -58,8 +58,6 @@ _WORK_OF_A_FRAGMENTED_SAMPLE = 256
 _UNKNOWN_PREFIX = bytes(12)
 # INFO_REPLY is understood and not acted upon: answers go to the locators that the participant announced.
 _WITHOUT_EFFECT = frozenset({SubmessageKind.PAD, SubmessageKind.INFO_REPLY, SubmessageKind.INFO_REPLY_IP4})
-_LE_AND_QOS = 0x03
-_DATA_FRAG_FIXED = 32  # octets of its body before an inline QoS
 _WORTH_A_PLACE = 1 << 14  # octets of a run that are decrypted to where they belong, to spare a copy
 _KEY_HASH_QOS = 24  # octets of an inline QoS that holds a key hash alone
 _CLEAR, _IN_MESSAGE, _IN_ENVELOPE = int(Protection.NONE), int(Protection.MESSAGE), int(Protection.SUBMESSAGE)
@@ -342,7 +340,7 @@ class Inbound:
         if not incoming.is_for_us:
             return
         data = Data.decode(raw.flags, raw.body)
-        _check_number(data.writer_sn, raw.kind, raw.offset)
+        _check_number(data.writer_sn, raw)
         inline = InlineQos.read(data.inline_qos)
         remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
         if remote is None:
@@ -354,7 +352,7 @@ class Inbound:
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
         if data.non_standard_payload and not self._hooks.protects_payload(remote.guid):
-            self._not_cdr(incoming, remote, data)
+            self._not_cdr(incoming, remote, data.reader_id, data.writer_sn)
             return
         payload: Octets | Outcome = data.serialized_payload
         is_bare_end = not len(data.serialized_payload) and bool(inline.status & 3)
@@ -494,75 +492,74 @@ class Inbound:
         """One run of fragments: decoded and joined once, whoever reads it."""
         if not incoming.is_for_us:
             return
-        key_hash = key_hash_alone(body, 0, len(body), _DATA_FRAG_FIXED) if flags & 3 == _LE_AND_QOS else b""
-        data = DataFrag.decode(flags, body, inline_qos_octets=_KEY_HASH_QOS if key_hash else 0)
-        _check_number(data.writer_sn, _DATA_FRAG)
-        remote = self._engine.remote_writers.get(incoming.prefix + data.writer_id)
+        run = FragmentRun(flags, body)
+        if run.writer_sn >= NUMBERS_END:
+            raise _absurd(run.writer_sn, _DATA_FRAG)
+        remote = self._engine.remote_writers.get(incoming.prefix + run.writer_id)
         if remote is None:
-            self._unmatched(incoming, data.writer_id)
+            self._unmatched(incoming, run.writer_id)
             return
         if not self._hooks.admits(remote.guid, incoming.protection):
             self._engine.dropped(DropReason.CLEAR_TEXT, incoming.source)
             return
-        if data.sample_size > self._engine.config.max_sample_size:
-            self._engine.dropped(DropReason.SAMPLE_TOO_LARGE, incoming.source, f"{data.sample_size} octets")
+        if run.sample_size > self._engine.config.max_sample_size:
+            self._engine.dropped(DropReason.SAMPLE_TOO_LARGE, incoming.source, f"{run.sample_size} octets")
             return
-        if not self._is_wanted(incoming, remote, data):
+        if not self._is_wanted(incoming, remote, run):
             return
-        is_begun = data.writer_sn in remote.defragmenter
+        is_begun = run.writer_sn in remote.defragmenter
         if not is_begun and not self._may_ask(incoming, _WORK_OF_A_FRAGMENTED_SAMPLE):
             return
         is_protected = self._hooks.protects_payload(remote.guid)
-        if data.non_standard_payload and not is_protected:
-            self._not_cdr(incoming, remote, data)
+        if run.non_standard_payload and not is_protected:
+            self._not_cdr(incoming, remote, run.reader_id, run.writer_sn)
             return
         # Protection makes a run longer than padding does.  One that was not made longer is part of a sample that was
         # protected as a whole (OpenDDS): it cannot be opened before the last fragment is here.
-        run_length = data.run_length
-        is_sealed = is_protected and len(data.serialized_payload) < run_length + 4
+        is_sealed = is_protected and len(run.payload) < run.length + 4
         begun: PartialSample | None = None
-        fragments: Octets | Outcome = data.serialized_payload
+        fragments: Octets | Outcome = run.payload
         if not is_sealed:
             place: memoryview | None = None
-            if is_protected and run_length >= _WORTH_A_PLACE:
+            if is_protected and run.length >= _WORTH_A_PLACE:
                 begun = remote.defragmenter.begin(
-                    data.writer_sn, data.reader_id,
-                    sample_size=data.sample_size, fragment_size=data.fragment_size, count=data.fragments_in_submessage,
+                    run.writer_sn, run.reader_id,
+                    sample_size=run.sample_size, fragment_size=run.fragment_size, count=run.count,
                 )  # fmt: skip
                 if begun is not None:
-                    place = begun.place_of(data.fragment_starting_num, data.fragments_in_submessage)
-            fragments = self._hooks.decode_payload(remote.guid, data.serialized_payload, place)
+                    place = begun.place_of(run.first, run.count)
+            fragments = self._hooks.decode_payload(remote.guid, run.payload, place)
         if isinstance(fragments, Outcome):
             self.undecodable(fragments, incoming.source)
             return
-        if len(fragments) < run_length:
-            raise MalformedMessage(f"{len(fragments)} octets of {run_length}", element="DATA_FRAG")
+        if len(fragments) < run.length:
+            raise MalformedMessage(f"{len(fragments)} octets of {run.length}", element="DATA_FRAG")
         # Read at once: it lies in a buffer that holds something else when the last fragment comes.
         inline: InlineQos | None = None
-        if key_hash:
-            inline = InlineQos(key_hash=key_hash)
-        elif data.inline_qos is not None:
-            inline = InlineQos.read(data.inline_qos)
-        self._add_fragments(incoming, remote, data, memoryview(fragments), inline, is_sealed=is_sealed, begun=begun)
+        if run.key_hash:
+            inline = InlineQos(key_hash=run.key_hash)
+        elif run.inline_qos is not None:
+            inline = InlineQos.read(run.inline_qos)
+        self._add_fragments(incoming, remote, run, memoryview(fragments), inline, is_sealed=is_sealed, begun=begun)
 
-    def _not_cdr(self, incoming: Incoming, remote: RemoteWriter, data: Data | DataFrag) -> None:
+    def _not_cdr(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, number: int) -> None:
         """Flag N.  RTPS 2.5 §8.3.8.2: only who has agreed on such a payload can read it."""
         self._engine.dropped(DropReason.UNSUPPORTED, incoming.source, "a payload that is no CDR")
-        self._nothing(incoming, remote, data.reader_id, data.writer_sn)
+        self._nothing(incoming, remote, reader_id, number)
 
-    def _is_wanted(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag) -> bool:
+    def _is_wanted(self, incoming: Incoming, remote: RemoteWriter, run: FragmentRun) -> bool:
         """Does any reader lack this sample?  Each is told that it exists."""
         wanted = False
         for reader, proxy in remote.readers:
-            if data.reader_id in (_UNKNOWN_ID, reader.guid[12:]):
-                wanted = reader.fragment_received(proxy, data.writer_sn, incoming.now) or wanted
+            if run.reader_id in (_UNKNOWN_ID, reader.guid[12:]):
+                wanted = reader.fragment_received(proxy, run.writer_sn, incoming.now) or wanted
         return wanted
 
     def _add_fragments(
         self,
         incoming: Incoming,
         remote: RemoteWriter,
-        data: DataFrag,
+        run: FragmentRun,
         fragments: memoryview,
         inline: InlineQos | None,
         *,
@@ -572,12 +569,12 @@ class Inbound:
         defragmenter = remote.defragmenter
         dropped = defragmenter.dropped
         sample = defragmenter.add(
-            data.writer_sn,
-            bytes(data.reader_id),
-            sample_size=data.sample_size,
-            fragment_size=data.fragment_size,
-            first=data.fragment_starting_num,
-            count=data.fragments_in_submessage,
+            run.writer_sn,
+            run.reader_id,
+            sample_size=run.sample_size,
+            fragment_size=run.fragment_size,
+            first=run.first,
+            count=run.count,
             fragments=fragments,
             now=incoming.now,
             is_sealed=is_sealed,
@@ -592,9 +589,11 @@ class Inbound:
             sample.inline_qos = inline or sample.inline_qos
             sample.timestamp = incoming.timestamp
         if sample.is_complete:
-            self._sample_complete(incoming, remote, data, sample)
+            self._sample_complete(incoming, remote, run, sample)
 
-    def _sample_complete(self, incoming: Incoming, remote: RemoteWriter, data: DataFrag, sample: PartialSample) -> None:
+    def _sample_complete(
+        self, incoming: Incoming, remote: RemoteWriter, run: FragmentRun, sample: PartialSample
+    ) -> None:
         octets: bytes | bytearray = sample.octets
         if sample.is_sealed:
             payload = self._hooks.decode_payload(remote.guid, octets)
@@ -604,7 +603,7 @@ class Inbound:
             octets = bytes(payload)
         timestamp, incoming.timestamp = incoming.timestamp, sample.timestamp
         inline = sample.inline_qos if isinstance(sample.inline_qos, InlineQos) else InlineQos()
-        self._joined(incoming, remote, sample.reader_id, data.writer_sn, octets, inline, is_key=data.is_key)
+        self._joined(incoming, remote, sample.reader_id, run.writer_sn, octets, inline, is_key=run.is_key)
         incoming.timestamp = timestamp
 
     # --- HEARTBEAT, GAP ----------------------------------------------------------------------------------
@@ -631,7 +630,7 @@ class Inbound:
 
     def _heartbeat(self, incoming: Incoming, raw: RawSubmessage) -> None:
         heartbeat = Heartbeat.decode(raw.flags, raw.body)
-        _check_number(heartbeat.last_sn, raw.kind, raw.offset)
+        _check_number(heartbeat.last_sn, raw)
         restarted = False
         pairs = self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id)
         for local, proxy in pairs:
@@ -660,7 +659,7 @@ class Inbound:
     def _heartbeat_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         """RTPS 2.5 §8.3.8.7: ask at once for fragments that should be here.  Ignored for samples of which none is."""
         heartbeat = HeartbeatFrag.decode(raw.flags, raw.body)
-        _check_number(heartbeat.writer_sn, raw.kind, raw.offset)
+        _check_number(heartbeat.writer_sn, raw)
         if not self._may_ask(incoming, _WORK_OF_A_FRAGMENTED_SAMPLE):
             return
         for local, proxy in self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id):
@@ -669,7 +668,7 @@ class Inbound:
 
     def _gap(self, incoming: Incoming, raw: RawSubmessage) -> None:
         gap = Gap.decode(raw.flags, raw.body)
-        _check_number(max(gap.gap_start, gap.gap_list.end), raw.kind, raw.offset)
+        _check_number(max(gap.gap_start, gap.gap_list.end), raw)
         if not self._may_ask(incoming, gap.gap_list.bitmap.bit_count()):
             return
         for local, proxy in self._pairs(incoming, gap.writer_id, gap.reader_id):
@@ -690,7 +689,7 @@ class Inbound:
 
     def _acknack(self, incoming: Incoming, raw: RawSubmessage) -> None:
         acknack = AckNack.decode(raw.flags, raw.body)
-        _check_number(acknack.reader_sn_state.end, raw.kind, raw.offset)
+        _check_number(acknack.reader_sn_state.end, raw)
         if not incoming.is_for_us:
             return
         writer = self._engine.local_writers.get(Guid(self._own_prefix + acknack.writer_id))
@@ -714,7 +713,7 @@ class Inbound:
 
     def _nack_frag(self, incoming: Incoming, raw: RawSubmessage) -> None:
         nack = NackFrag.decode(raw.flags, raw.body)
-        _check_number(nack.writer_sn, raw.kind, raw.offset)
+        _check_number(nack.writer_sn, raw)
         if not incoming.is_for_us:
             return
         writer = self._engine.local_writers.get(Guid(self._own_prefix + nack.writer_id))
@@ -734,6 +733,10 @@ class Inbound:
         self._engine.writer_answers(writer, answers)
 
 
-def _check_number(number: int, kind: int, offset: int = 0) -> None:
+def _check_number(number: int, raw: RawSubmessage) -> None:
     if number >= NUMBERS_END:
-        raise MalformedMessage(f"no writer reaches {number}", element=submessage_name(kind), offset=offset)
+        raise _absurd(number, raw.kind, raw.offset)
+
+
+def _absurd(number: int, kind: int, offset: int = 0) -> MalformedMessage:
+    return MalformedMessage(f"no writer reaches {number}", element=submessage_name(kind), offset=offset)

@@ -129,10 +129,8 @@ class DataFrag:
         return head + qos
 
     @classmethod
-    def decode(cls, flags: int, body: Octets, *, inline_qos_octets: int = 0) -> DataFrag:
+    def decode(cls, flags: int, body: Octets) -> DataFrag:
         """The payload is a view of ``body``.  RTPS 2.5 §8.3.8.3.3.
-
-        ``inline_qos_octets``: of an inline QoS that was read already, and is left out; 0 where it was not.
 
         Malformed: a number below 1, a run that begins or ends beyond the sample, a run that is not all there.
         """
@@ -150,9 +148,7 @@ class DataFrag:
         if (starting_num + count - 2) * size >= sample_size:
             raise _malformed(f"fragment {starting_num + count - 1} of {size} octets is beyond {sample_size}")
         inline_qos = None
-        if inline_qos_octets:
-            rest += inline_qos_octets
-        elif flags & _INLINE_QOS:
+        if flags & _INLINE_QOS:
             inline_qos, length = ParameterList.decode(view, little_endian=little_endian, start=rest)
             rest += length
         end = (starting_num + count - 1) * size
