@@ -40,6 +40,7 @@ _MAX_FORGOTTEN = 1024
 _NOT_NEW = ViewState.NOT_NEW
 _NEW = ViewState.NEW
 _ALIVE = InstanceState.ALIVE
+_ANY_STATES = (int(ANY_SAMPLE_STATE), int(ANY_VIEW_STATE), int(ANY_INSTANCE_STATE))
 _READ = SampleState.READ
 
 SampleSelector = Callable[[SampleInfo], bool]
@@ -573,6 +574,8 @@ class ReaderHistoryCache:
             only = self._instances.get(key)
             source = only.samples if only is not None else deque()
         chosen: list[tuple[SampleInfo, Instance]] = []
+        # As nearly all are asked for so, and to combine two flags costs more than all the rest of this loop.
+        of_any_state = (sample_states, view_states, instance_states) == _ANY_STATES
         for info in source:
             if max_samples is not None and len(chosen) >= max_samples:
                 break
@@ -580,11 +583,13 @@ class ReaderHistoryCache:
                 continue
             instance = self._instances[info.instance_handle]
             if (
-                info.sample_state & sample_states
-                and instance.view_state & view_states
-                and instance.state & instance_states
-                and (selector is None or selector(info))
-            ):
+                of_any_state
+                or (
+                    info.sample_state & sample_states
+                    and instance.view_state & view_states
+                    and instance.state & instance_states
+                )
+            ) and (selector is None or selector(info)):
                 chosen.append((info, instance))
         if not self._keeps_arrival_order and len(self._instances) > 1:
             chosen = _by_instance(chosen)
