@@ -1,14 +1,15 @@
-"""Secured: what protection costs, beside our own figures without it, which are measured right before.
+"""Secured: what protection costs, beside our own figures without it, which are measured in turns with it.
 
 ``x plain``: the plain time divided by the secured one, so that 1 means that protection costs nothing.  The other two
 go by processor time, of the busier of the two processes, as that does not tell what else the machine does.
 ``us/layer``: what each layer of protection adds to it for a sample.  ``x bare``, for large samples: what a plain sample
-takes together with one bare AEAD call a layer and one copy, divided by what a secured one takes.
+takes together with one bare AEAD call a layer and one copy, divided by what a secured one takes.  Of each the best turn
+counts: whatever else the machine does adds to processor time, as caches are shared, and never takes any away.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from benchmarks.benchmark import SECURED, SECURED_PEER, Benchmark, Better, Figure, Side
 from benchmarks.session import Session
@@ -25,7 +26,8 @@ _LAYERS: Mapping[str, Mapping[str, str]] = {
     "message": {"rtps": "sign_us"},
     "all": {"data": "encrypt_us", "metadata": "encrypt_us", "rtps": "sign_us"},
 }
-_SAMPLES = {"shape": (0, 40_000), "64KiB": (1 << 16, 2_000), "1MiB": (1 << 20, 100)}
+_SAMPLES = {"shape": (0, 15_000), "64KiB": (1 << 16, 2_000), "1MiB": (1 << 20, 100)}
+_TURNS = 3
 _BURSTS = 400
 _FIRST = "secured/first-sample"
 
@@ -38,8 +40,14 @@ def _enclaves(kind: str) -> tuple[str, str]:
 
 def _throughput(name: str, kind: str, octets: int, count: int) -> Callable[[Side, Session], Mapping[str, float]]:
     def measure(side: Side, session: Session) -> Mapping[str, float]:
-        plain = measure_throughput(side, session, octets, count)
-        secured = measure_throughput(side, session, octets, count, _enclaves(kind))
+        turns = [
+            (
+                measure_throughput(side, session, octets, count),
+                measure_throughput(side, session, octets, count, _enclaves(kind)),
+            )
+            for _ in range(_TURNS)
+        ]
+        plain, secured = (_best(found) for found in zip(*turns, strict=True))
         plain_us, secured_us = (max(found["receiver_us"], found["sender_us"]) for found in (plain, secured))
         values = {
             name: secured["per_second"] / plain["per_second"],
@@ -60,6 +68,12 @@ def _throughput(name: str, kind: str, octets: int, count: int) -> Callable[[Side
         return values
 
     return measure
+
+
+def _best(turns: Iterable[Mapping[str, float]]) -> Mapping[str, float]:
+    """Of each figure by itself: most samples in a second, least processor time."""
+    found = list(turns)
+    return {name: (max if name == "per_second" else min)(turn[name] for turn in found) for name in found[0]}
 
 
 def _throughput_row(kind: str, label: str, octets: int, count: int) -> Benchmark:
