@@ -14,7 +14,7 @@ from ddsi.structure.dataclass import dataclass
 
 from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
 
-__all__ = ["CryptoTransform", "OpensAlike", "SecureSubmessage", "SecureSubmessageCategory"]
+__all__ = ["CryptoTransform", "OpensAlike", "SealsAlike", "SecureSubmessage", "SecureSubmessageCategory"]
 
 
 class SecureSubmessageCategory(Enum):
@@ -140,6 +140,30 @@ class CryptoTransform(Protocol):
         sending_datawriter_crypto: DatawriterCryptoHandle,
     ) -> Octets | Outcome:
         """§8.5.1.9.9.  A whole payload, or one run of fragments, as it was encoded."""
+        ...
+
+
+@runtime_checkable
+class SealsAlike(Protocol):
+    """What a CryptoTransform may offer besides, to make the path of every sample shorter.  Not the OMG's."""
+
+    def message_sealer(
+        self,
+        sending_participant_crypto: ParticipantCryptoHandle,
+        receiving_participant_crypto_list: Sequence[ParticipantCryptoHandle],
+    ) -> Callable[[Parts], Parts | Refused] | None:
+        """Does what encoding with these handles does.
+
+        It is used until keys or endpoints come or go.  None: there is no short way.
+        """
+        ...
+
+    def submessage_sealer(
+        self,
+        sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
+        receiving_crypto_list: Sequence[DatareaderCryptoHandle | DatawriterCryptoHandle],
+    ) -> Callable[[Parts], Parts | Refused] | None:
+        """The same for the submessages of a writer or a reader."""
         ...
 
 

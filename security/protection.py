@@ -20,7 +20,7 @@ from ddsi.structure.guid import Guid
 from ddsi.structure.vendor import FAST_DDS, OPENDDS, RTI, RTI_MICRO, VendorId
 
 from .attributes import ParticipantSecurityAttributes
-from .crypto_transform_plugin import OpensAlike, SecureSubmessageCategory
+from .crypto_transform_plugin import OpensAlike, SealsAlike, SecureSubmessageCategory
 from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
 from .key_exchange import KeyExchange, Pair
 from .local_endpoint import NEVER_IN_MESSAGES, PLAIN_BUILTIN, LocalEndpoint
@@ -81,6 +81,7 @@ class Protection:
         self._message_encoders: dict[tuple[Guid, ...], Encoder] = {}
         """By receivers."""
         self._short_ways = cryptographic if isinstance(cryptographic, OpensAlike) else None
+        self._sealing = cryptographic if isinstance(cryptographic, SealsAlike) else None
         self._message_openers: dict[bytes, tuple[bytes, Opener, RemoteParticipant]] = {}
         """By source: what followed the header of its last message, and what opened it."""
         self._openers: dict[bytes, tuple[EnvelopeOpener, RemoteParticipant]] = {}
@@ -151,15 +152,17 @@ class Protection:
             return _leave_it
         pairs = (self._keys.pairs.get((sender, receiver)) for receiver in receivers)
         handles = [pair.handle for pair in pairs if pair is not None and pair.is_open]
-        handle, cryptographic = endpoint.handle, self._cryptographic
+        handle, cryptographic, short_ways = endpoint.handle, self._cryptographic, self._sealing
         readers = [handle for handle in handles if isinstance(handle, DatareaderCryptoHandle)]
         writers = [handle for handle in handles if isinstance(handle, DatawriterCryptoHandle)]
         if isinstance(handle, DatawriterCryptoHandle) and readers:
             of_writer = cryptographic.encode_datawriter_submessage
-            return lambda submessage: of_writer(submessage, handle, readers)
+            short = None if short_ways is None else short_ways.submessage_sealer(handle, readers)
+            return short or (lambda submessage: of_writer(submessage, handle, readers))
         if isinstance(handle, DatareaderCryptoHandle) and writers:
             of_reader = cryptographic.encode_datareader_submessage
-            return lambda submessage: of_reader(submessage, handle, writers)
+            short = None if short_ways is None else short_ways.submessage_sealer(handle, writers)
+            return short or (lambda submessage: of_reader(submessage, handle, writers))
         return _refuse_it
 
     def encode_message(self, receivers: tuple[Guid, ...], message: Parts) -> Parts:
@@ -180,7 +183,8 @@ class Protection:
         if not handles:
             return _refuse_it
         encode, ours = self._cryptographic.encode_rtps_message, self._local_participant
-        return lambda message: encode(message, ours, handles)
+        short = None if self._sealing is None else self._sealing.message_sealer(ours, handles)
+        return short or (lambda message: encode(message, ours, handles))
 
     def _nothing(self) -> Parts:
         self.refused += 1

@@ -18,13 +18,13 @@ from .payload import USED_UP
 from .session_keys import NONCE_AT, ReceiverKey, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH
 
-__all__ = ["seal_message", "seal_submessage"]
+__all__ = ["INFO_SRC_HEAD", "seal_message", "seal_submessage"]
 
 _MOST_RECEIVERS: Final = (LONGEST_BODY - FOOTER_LENGTH) // RECEIVER_MAC_LENGTH
 _PADDING: Final = (b"", bytes(3), bytes(2), bytes(1))
 _NO_MACS: Final = bytes(4)
 
-_INFO_SRC_HEAD: Final = HEAD.pack(SubmessageKind.INFO_SRC, 1, 20) + bytes(4)
+INFO_SRC_HEAD: Final = HEAD.pack(SubmessageKind.INFO_SRC, 1, 20) + bytes(4)
 """With the field ``unused``.  Version, vendor and prefix, which follow, lie together in the message's header too."""
 
 
@@ -40,7 +40,7 @@ def seal_message(message: Parts, key: SendingKey, receivers: Sequence[ReceiverKe
         first, rest = b"".join(message), []
     if len(first) >= LARGE:
         first = memoryview(first)
-    return _seal(MESSAGE, bytes(first[:HEADER_LENGTH]), (_INFO_SRC_HEAD, first[4:], *rest), key, receivers)
+    return _seal(MESSAGE, bytes(first[:HEADER_LENGTH]), (INFO_SRC_HEAD, first[4:], *rest), key, receivers)
 
 
 def _seal(

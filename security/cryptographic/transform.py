@@ -15,7 +15,7 @@ from ddsi.structure.errors import MalformedMessage
 
 from ..crypto_transform_plugin import SecureSubmessage, SecureSubmessageCategory
 from ..handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
-from . import envelope, openers, opening, payload, sealing
+from . import envelope, openers, opening, payload, sealers, sealing
 from .crypto_handles import (
     NO_KEY,
     LocalParticipant,
@@ -102,6 +102,31 @@ class AesGcmGmacTransform:
             if not receivers:
                 return _NO_RECEIVER
         return sealing.seal_message(plain_rtps_message, key, receivers)
+
+    def message_sealer(
+        self,
+        sending_participant_crypto: ParticipantCryptoHandle,
+        receiving_participant_crypto_list: Sequence[ParticipantCryptoHandle],
+    ) -> Callable[[Parts], Parts | Refused] | None:
+        """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.SealsAlike`."""
+        assert isinstance(sending_participant_crypto, LocalParticipant)
+        key, protection = sending_participant_crypto.key, sending_participant_crypto.protection
+        if key is None or protection is None or protection.origin_authenticated:
+            return None
+        return sealers.message_sealer(key)
+
+    def submessage_sealer(
+        self,
+        sending_crypto: DatawriterCryptoHandle | DatareaderCryptoHandle,
+        receiving_crypto_list: Sequence[DatareaderCryptoHandle | DatawriterCryptoHandle],
+    ) -> Callable[[Parts], Parts | Refused] | None:
+        """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.SealsAlike`."""
+        sender = sending_crypto
+        assert isinstance(sender, LocalWriter | LocalReader)
+        key, protection = sender.submessage_key, sender.submessage
+        if sender.is_volatile or key is None or protection is None or protection.origin_authenticated:
+            return None
+        return sealers.submessage_sealer(key)
 
     # --- inwards ---------------------------------------------------------------------------------------------
 

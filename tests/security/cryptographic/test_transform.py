@@ -477,6 +477,35 @@ def test_a_key_that_is_used_up_encodes_nothing(kind: Kind) -> None:
     assert all(isinstance(refused, Refused) and "used up" in refused.reason for refused in refusals)
 
 
+@pytest.mark.parametrize("kind", PROTECTED)
+def test_there_is_a_short_way_of_sealing_where_all_receivers_get_the_same(kind: Kind) -> None:
+    alice, bob = pair(kind)
+    found = match(alice, bob, endpoint_attributes(kind, kind))
+    plugin, others = alice.plugin, [alice.remote(bob)]
+    writer, reader, readers, writers = found.writer, found.reader, [found.remote_reader], [found.remote_writer]
+    beat = (vectors.HEARTBEAT,)
+    for short, general, plain in (
+        (plugin.submessage_sealer(writer, readers), plugin.encode_datawriter_submessage(beat, writer, readers), beat),
+        (plugin.submessage_sealer(reader, writers), plugin.encode_datareader_submessage(beat, reader, writers), beat),
+        (
+            plugin.message_sealer(alice.handle, others),
+            plugin.encode_rtps_message((vectors.MESSAGE,), alice.handle, others),
+            (vectors.MESSAGE,),
+        ),
+    ):
+        if kind in (Kind.SIGN, Kind.ENCRYPT):
+            assert short is not None
+            assert len(octets_of(short(plain))) == len(octets_of(general))
+        else:
+            assert short is None
+
+
+def test_the_volatile_endpoints_are_sealed_for_each_receiver_by_itself() -> None:
+    alice, bob = pair(Kind.ENCRYPT)
+    volatile = volatile_match(alice, bob)
+    assert alice.plugin.submessage_sealer(volatile.writer, [volatile.remote_reader]) is None
+
+
 def test_what_does_not_fit_its_envelope_is_refused() -> None:
     alice, bob = pair(Kind.ENCRYPT_WITH_ORIGIN)
     found = match(alice, bob, endpoint_attributes(Kind.ENCRYPT_WITH_ORIGIN))

@@ -1,0 +1,74 @@
+"""The short ways of sealing, for receivers that share no key with the sender alone: they all get the same octets.
+
+DDS-Security 1.1 §9.5.3.3 (encode_rtps_message, encode_datawriter_submessage, encode_datareader_submessage).
+What depends on the key alone is settled once.  :mod:`.sealing` is the general way; tests hold each pair against each
+other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from ddsi.spi import Parts, Refused
+
+from .aes_gcm import LARGE
+from .envelope import LONGEST_BODY, MESSAGE, SUBMESSAGE, body_head
+from .payload import USED_UP
+from .sealing import INFO_SRC_HEAD, seal_message, seal_submessage
+from .session_keys import NONCE_AT, SendingKey
+from .transformation import HEADER_LENGTH, MAC_LENGTH
+
+__all__ = ["Sealer", "message_sealer", "submessage_sealer"]
+
+Sealer = Callable[[Parts], Parts | Refused]
+
+_LONGEST: Final = LONGEST_BODY - 4
+_NO_MACS: Final = bytes(4)
+
+
+def submessage_sealer(key: SendingKey) -> Sealer:
+    """Does what :func:`~.sealing.seal_submessage` does with this key."""
+    if not key.encrypts:
+        return lambda submessage: seal_submessage(submessage, key, ())
+    prefix_head, postfix_head = SUBMESSAGE.prefix_head, SUBMESSAGE.postfix_head
+
+    def seal(submessage: Parts) -> Parts | Refused:
+        body = submessage[0] if len(submessage) == 1 else b"".join(submessage)
+        length = len(body)
+        if length > _LONGEST or length & 3:
+            return seal_submessage((body,), key, ())
+        header = key.next_header(length)
+        if header is None:
+            return USED_UP
+        sealed = key.aead.encrypt(header[NONCE_AT:], body, None)
+        return (
+            prefix_head + header + body_head(length),
+            memoryview(sealed)[:-MAC_LENGTH],
+            postfix_head + sealed[-MAC_LENGTH:] + _NO_MACS,
+        )
+
+    return seal
+
+
+def message_sealer(key: SendingKey) -> Sealer:
+    """Does what :func:`~.sealing.seal_message` does with this key."""
+    if key.encrypts:
+        return lambda message: seal_message(message, key, ())
+    prefix_head, postfix_head = MESSAGE.prefix_head, MESSAGE.postfix_head
+
+    def seal(message: Parts) -> Parts | Refused:
+        first = message[0]
+        if not HEADER_LENGTH <= len(first) < LARGE:
+            return seal_message(message, key, ())
+        body = b"".join((INFO_SRC_HEAD, first[4:], *message[1:]))
+        length = len(body)
+        if length & 3:
+            return seal_message(message, key, ())
+        header = key.next_header(length)
+        if header is None:
+            return USED_UP
+        mac = key.aead.encrypt(header[NONCE_AT:], b"", body)
+        return bytes(first[:HEADER_LENGTH]) + prefix_head + header, body, postfix_head + mac + _NO_MACS
+
+    return seal
