@@ -208,16 +208,16 @@ class Defragmenter:
         return sample
 
     def begin(
-        self, sequence_number: int, reader_id: bytes, *, sample_size: int, fragment_size: int, count: int
+        self, sequence_number: int, reader_id: bytes, octets: int, *, sample_size: int, fragment_size: int
     ) -> PartialSample | None:
-        """The sample in whose octets ``count`` fragments may be put before it is known whether they are to be believed.
+        """The sample in which so many ``octets`` may be put before it is known whether they are to be believed.
 
         One that is not here yet is not held: it exists for these fragments alone until they are added, and only where
-        they are half of it at least, so that nobody makes us take more memory than he has sent octets.
+        they are half of it at least, so that nobody makes us take much more memory than he has sent octets.
         """
         samples = self._partial.get(sequence_number)
         if samples is None:
-            is_large_part = 2 * count * fragment_size >= sample_size
+            is_large_part = 2 * octets >= sample_size
             return PartialSample(sample_size, fragment_size, bytes(reader_id)) if is_large_part else None
         sample = samples.get(_TO_ALL) or samples.get(reader_id)
         if sample is None or not sample.is_like(sample_size, fragment_size, is_sealed=False):

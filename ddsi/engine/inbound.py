@@ -518,16 +518,14 @@ class Inbound:
         # protected as a whole (OpenDDS): it cannot be opened before the last fragment is here.
         is_sealed = is_protected and len(run.payload) < run.length + 4
         begun: PartialSample | None = None
+        place: memoryview | None = None
+        if is_protected and not is_sealed and run.length >= _WORTH_A_PLACE:
+            begun = remote.defragmenter.begin(
+                run.writer_sn, run.reader_id, run.length, sample_size=run.sample_size, fragment_size=run.fragment_size
+            )
+            place = None if begun is None else begun.place_of(run.first, run.count)
         fragments: Octets | Outcome = run.payload
         if not is_sealed:
-            place: memoryview | None = None
-            if is_protected and run.length >= _WORTH_A_PLACE:
-                begun = remote.defragmenter.begin(
-                    run.writer_sn, run.reader_id,
-                    sample_size=run.sample_size, fragment_size=run.fragment_size, count=run.count,
-                )  # fmt: skip
-                if begun is not None:
-                    place = begun.place_of(run.first, run.count)
             fragments = self._hooks.decode_payload(remote.guid, run.payload, place)
         if isinstance(fragments, Outcome):
             self.undecodable(fragments, incoming.source)

@@ -322,7 +322,7 @@ def test_when_missing_fragments_are_asked_for(
 
 def test_what_was_begun_for_fragments_is_held_once_they_are_added() -> None:
     defrag = defragmenter()
-    begun = defrag.begin(1, TO_ALL, sample_size=30, fragment_size=10, count=2)
+    begun = defrag.begin(1, TO_ALL, 20, sample_size=30, fragment_size=10)
     assert begun is not None
     place = begun.place_of(1, 2)
     assert place is not None
@@ -341,15 +341,15 @@ def test_what_was_begun_for_fragments_is_held_once_they_are_added() -> None:
 
 def test_nothing_is_begun_for_less_than_half_a_sample() -> None:
     defrag = defragmenter()
-    assert defrag.begin(1, TO_ALL, sample_size=1 << 40, fragment_size=65_000, count=1) is None
-    assert defrag.begin(1, TO_ALL, sample_size=30, fragment_size=10, count=1) is None
-    assert defrag.begin(1, TO_ALL, sample_size=20, fragment_size=10, count=1) is not None
+    assert defrag.begin(1, TO_ALL, 65_000, sample_size=1 << 40, fragment_size=65_000) is None
+    assert defrag.begin(1, TO_ALL, 10, sample_size=30, fragment_size=10) is None
+    assert defrag.begin(1, TO_ALL, 10, sample_size=20, fragment_size=10) is not None
 
 
 def test_a_place_is_given_of_what_is_not_here_alone() -> None:
     defrag = defragmenter()
     add(defrag, 1, 2)
-    begun = defrag.begin(1, R1, sample_size=30, fragment_size=10, count=1)
+    begun = defrag.begin(1, R1, 10, sample_size=30, fragment_size=10)
     assert begun is not None
     assert [begun.place_of(first, count) is not None for first, count in ((1, 1), (2, 1), (3, 1), (1, 2), (2, 2))] == [
         True, False, True, False, False,
@@ -365,7 +365,7 @@ def test_a_place_is_given_of_what_is_not_here_alone() -> None:
 def test_nothing_is_begun_of_what_contradicts_or_is_for_another() -> None:
     defrag = defragmenter()
     add(defrag, 1, 2, reader=R1)
-    assert defrag.begin(1, R1, sample_size=40, fragment_size=10, count=3) is None
-    assert defrag.begin(1, R2, sample_size=30, fragment_size=10, count=2) is None
+    assert defrag.begin(1, R1, 30, sample_size=40, fragment_size=10) is None
+    assert defrag.begin(1, R2, 20, sample_size=30, fragment_size=10) is None
     add(defrag, 2, 2, sealed=True)
-    assert defrag.begin(2, TO_ALL, sample_size=30, fragment_size=10, count=2) is None
+    assert defrag.begin(2, TO_ALL, 20, sample_size=30, fragment_size=10) is None
