@@ -166,6 +166,12 @@ class SealsAlike(Protocol):
         """The same for the submessages of a writer or a reader."""
         ...
 
+    def payload_sealer(
+        self, sending_datawriter_crypto: DatawriterCryptoHandle
+    ) -> Callable[[Octets], Parts | Refused] | None:
+        """The same for a writer's payloads."""
+        ...
+
 
 @runtime_checkable
 class OpensAlike(Protocol):

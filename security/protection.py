@@ -52,6 +52,7 @@ _SMALL: Final = 1 << 12
 
 
 Encoder = Callable[[Parts], Parts | Refused]
+PayloadEncoder = Callable[[Octets], Parts | Refused]
 Opener = Callable[[Octets], Octets | None]
 PayloadOpener = Callable[[Octets, memoryview | None], Octets | None]
 EnvelopeOpener = Callable[[memoryview, int, int], tuple[Octets, int] | None]
@@ -75,7 +76,7 @@ class Protection:
         self._local_endpoints = local_endpoints
         self._remotes = remotes
         self._keys = keys
-        self._payload_writers: dict[Guid, DatawriterCryptoHandle | None] = {}
+        self._payload_encoders: dict[Guid, PayloadEncoder | None] = {}
         self._submessage_encoders: dict[tuple[Guid, tuple[Guid, ...]], Encoder] = {}
         """By sender and receivers."""
         self._message_encoders: dict[tuple[Guid, ...], Encoder] = {}
@@ -98,7 +99,7 @@ class Protection:
     def changed(self) -> None:
         """Endpoints or participants came or went."""
         self._required.clear()
-        self._payload_writers.clear()
+        self._payload_encoders.clear()
         self._submessage_encoders.clear()
         self._message_encoders.clear()
         self._message_openers.clear()
@@ -120,22 +121,24 @@ class Protection:
 
     def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
         try:
-            handle = self._payload_writers[writer]
+            encode = self._payload_encoders[writer]
         except KeyError:
-            handle = self._payload_writers[writer] = self._payload_writer(writer)
-        if handle is None:
+            encode = self._payload_encoders[writer] = self._payload_encoder(writer)
+        if encode is None:
             return payload
-        encoded = self._cryptographic.encode_serialized_payload(bytearray(), payload, handle)
+        encoded = encode(payload)
         assert not isinstance(encoded, Refused), encoded
         return encoded[0] if len(encoded) == 1 else b"".join(encoded)
 
-    def _payload_writer(self, writer: Guid) -> DatawriterCryptoHandle | None:
-        """The handle of a writer whose payloads are protected."""
+    def _payload_encoder(self, writer: Guid) -> PayloadEncoder | None:
+        """The same for every payload of this writer; None where they are not protected."""
         endpoint = self._local_endpoints.get(writer)
         if endpoint is None or not endpoint.attributes.is_payload_protected:
             return None
-        assert isinstance(endpoint.handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
-        return endpoint.handle
+        handle, encode = endpoint.handle, self._cryptographic.encode_serialized_payload
+        assert isinstance(handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
+        short = None if self._sealing is None else self._sealing.payload_sealer(handle)
+        return short or (lambda payload: encode(bytearray(), payload, handle))
 
     def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         key = (sender, receivers)

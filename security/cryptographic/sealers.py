@@ -1,8 +1,9 @@
 """The short ways of sealing, for receivers that share no key with the sender alone: they all get the same octets.
 
-DDS-Security 1.1 §9.5.3.3 (encode_rtps_message, encode_datawriter_submessage, encode_datareader_submessage).
-What depends on the key alone is settled once.  :mod:`.sealing` is the general way; tests hold each pair against each
-other.
+DDS-Security 1.1 §9.5.3.3 (encode_rtps_message, encode_datawriter_submessage, encode_datareader_submessage,
+encode_serialized_payload).
+What depends on the key alone is settled once.  :mod:`.sealing` and :mod:`.payload` are the general ways; tests hold
+each pair against each other.
 """
 
 from __future__ import annotations
@@ -10,21 +11,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ddsi.spi import Parts, Refused
+from ddsi.spi import Octets, Parts, Refused
 
-from .aes_gcm import LARGE
+from .aes_gcm import LARGE, encrypt_into
 from .envelope import LONGEST_BODY, MESSAGE, SUBMESSAGE, body_head
-from .payload import USED_UP
+from .payload import USED_UP, encode_payload
+from .rooms import Rooms
 from .sealing import INFO_SRC_HEAD, seal_message, seal_submessage
 from .session_keys import NONCE_AT, SendingKey
 from .transformation import HEADER_LENGTH, MAC_LENGTH
 
-__all__ = ["Sealer", "message_sealer", "submessage_sealer"]
+__all__ = ["PayloadSealer", "Sealer", "message_sealer", "payload_sealer", "submessage_sealer"]
 
 Sealer = Callable[[Parts], Parts | Refused]
+PayloadSealer = Callable[[Octets], Parts | Refused]
 
 _LONGEST: Final = LONGEST_BODY - 4
 _NO_MACS: Final = bytes(4)
+_CONTENT_AT: Final = HEADER_LENGTH + 4
+_AROUND: Final = _CONTENT_AT + MAC_LENGTH + len(_NO_MACS)
 
 
 def submessage_sealer(key: SendingKey) -> Sealer:
@@ -70,5 +75,27 @@ def message_sealer(key: SendingKey) -> Sealer:
             return USED_UP
         mac = key.aead.encrypt(header[NONCE_AT:], b"", body)
         return bytes(first[:HEADER_LENGTH]) + prefix_head + header, body, postfix_head + mac + _NO_MACS
+
+    return seal
+
+
+def payload_sealer(key: SendingKey, rooms: Rooms) -> PayloadSealer:
+    """Does what :func:`~.payload.encode_payload` does with this key, in one part."""
+
+    def seal(plain: Octets) -> Parts | Refused:
+        length = len(plain)
+        if length & 3 or not key.encrypts:
+            return encode_payload(plain, key, rooms)
+        header = key.next_header(length)
+        if header is None:
+            return USED_UP
+        head = header + length.to_bytes(4, "big")
+        if length < LARGE:
+            return (head + key.aead.encrypt(header[NONCE_AT:], plain, None) + _NO_MACS,)
+        room = rooms.room(_AROUND + length)
+        room[:_CONTENT_AT] = head
+        encrypt_into(key.aead, header[NONCE_AT:], plain, room[_CONTENT_AT:-4])
+        room[-4:] = _NO_MACS
+        return (room,)
 
     return seal

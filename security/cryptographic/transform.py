@@ -128,6 +128,15 @@ class AesGcmGmacTransform:
             return None
         return sealers.submessage_sealer(key)
 
+    def payload_sealer(
+        self, sending_datawriter_crypto: DatawriterCryptoHandle
+    ) -> Callable[[Octets], Parts | Refused] | None:
+        """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.SealsAlike`."""
+        writer = sending_datawriter_crypto
+        assert isinstance(writer, LocalWriter)
+        key = writer.payload_key
+        return None if key is None else sealers.payload_sealer(key, writer.participant.rooms)
+
     # --- inwards ---------------------------------------------------------------------------------------------
 
     def decode_rtps_message(

@@ -8,8 +8,9 @@ import pytest
 
 from ddsi.spi import Parts, Refused
 from ddsi_security.cryptographic.aes_gcm import LARGE
-from ddsi_security.cryptographic.payload import USED_UP
-from ddsi_security.cryptographic.sealers import message_sealer, submessage_sealer
+from ddsi_security.cryptographic.payload import USED_UP, encode_payload
+from ddsi_security.cryptographic.rooms import Rooms
+from ddsi_security.cryptographic.sealers import message_sealer, payload_sealer, submessage_sealer
 from ddsi_security.cryptographic.sealing import seal_message, seal_submessage
 from ddsi_security.cryptographic.transformation import TransformationKind
 from tests.security.cryptographic.keys import material, octets_of, sending_key
@@ -45,6 +46,16 @@ def test_messages(kind: TransformationKind, size: int, at: tuple[int, ...]) -> N
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("size", [0, 1, 2, 3, *SIZES, 65_001, 100_000])
+def test_payloads(kind: TransformationKind, size: int) -> None:
+    plain = bytes(range(256)) * (size // 256) + bytes(size % 256)
+    seal, key = payload_sealer(sending_key(material(kind)), Rooms()), sending_key(material(kind))
+    for _ in range(3):
+        assert octets_of(seal(plain)) == octets_of(encode_payload(plain, key, Rooms()))
+        assert octets_of(seal(memoryview(plain))) == octets_of(encode_payload(plain, key, Rooms()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("size", [21, 22, 23, 70_000, 70_001])
 def test_odd_and_overlong_ones_end_as_they_do_in_the_general_way(kind: TransformationKind, size: int) -> None:
     for seal, general in (
@@ -64,7 +75,8 @@ def test_odd_and_overlong_ones_end_as_they_do_in_the_general_way(kind: Transform
 @pytest.mark.parametrize("make", [submessage_sealer, message_sealer])
 def test_a_key_that_was_wiped_seals_nothing(kind: TransformationKind, make: type) -> None:
     key = sending_key(material(kind))
-    seal = make(key)
+    seal, payload = make(key), payload_sealer(key, Rooms())
     assert not isinstance(seal((HEADER + bytes(4),)), Refused)
     key.wipe()
     assert seal((HEADER + bytes(4),)) is USED_UP
+    assert payload(bytes(4)) is USED_UP

@@ -500,6 +500,17 @@ def test_there_is_a_short_way_of_sealing_where_all_receivers_get_the_same(kind: 
             assert short is None
 
 
+@pytest.mark.parametrize("kind", PAYLOAD_KINDS)
+def test_there_is_a_short_way_of_sealing_payloads_where_they_are_protected(kind: Kind) -> None:
+    alice, bob = pair(kind)
+    found, clear = match(alice, bob, endpoint_attributes(kind, kind)), match(alice, bob, endpoint_attributes(kind))
+    assert alice.plugin.payload_sealer(clear.writer) is None
+    seal = alice.plugin.payload_sealer(found.writer)
+    assert seal is not None
+    encoded = octets_of(seal(bytes(8)))
+    assert bob.plugin.decode_serialized_payload(encoded, b"", found.reader, found.remote_writer) == bytes(8)
+
+
 def test_the_volatile_endpoints_are_sealed_for_each_receiver_by_itself() -> None:
     alice, bob = pair(Kind.ENCRYPT)
     volatile = volatile_match(alice, bob)
