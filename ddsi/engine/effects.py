@@ -1,6 +1,6 @@
 """What the engine asks its shell to do: small frozen values, in the order in which they are to be done.
 
-``DomainEngine.drain_effects`` gives them out; transport and simulation act on them.
+``Participant.drain_effects`` gives them out; transport and simulation act on them.
 """
 
 from __future__ import annotations

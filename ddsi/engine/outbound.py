@@ -136,8 +136,7 @@ class Outbound:
                     # A reader that joins first gets other octets than the rest, so each is sent its own.
                     one_by_one = reader is None and writer.joining_readers
                     for recipient in list(writer.behavior.readers.values()) if one_by_one else (reader,):
-                        for number in range(first, last + 1):
-                            self._send_fragment(writer, change, number, recipient)
+                        self._send_fragments(writer, change, first, last, recipient)
                 case SendHeartbeat():
                     self._send_heartbeat(writer, item)
                 case SendHeartbeatFrag(change, last, count):
@@ -162,6 +161,16 @@ class Outbound:
             is_key=change.kind is not ChangeKind.ALIVE,
         )
         self._append(writer, reader, data.encode(), change.source_timestamp)
+
+    def _send_fragments(
+        self, writer: LocalWriter, change: CacheChange, first: int, last: int, reader: ReaderProxy | None
+    ) -> None:
+        """To all readers, a message that the next fragment does not fit into leaves before that one is made."""
+        size, sample_size, fits = change.fragment_octets, len(change.payload), writer.packer.fits
+        for number in range(first, last + 1):
+            self._send_fragment(writer, change, number, reader)
+            if reader is None and number < last and not fits(min(size, sample_size - number * size)):
+                self._emit_group(writer)
 
     def _send_fragment(self, writer: LocalWriter, change: CacheChange, number: int, reader: ReaderProxy | None) -> None:
         size = change.fragment_octets

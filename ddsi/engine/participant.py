@@ -3,7 +3,8 @@
 RTPS 2.5 §8.2.4.1.  The contract with whoever drives it:
 
 1. Give it one input: :meth:`receive_datagram`, :meth:`handle_timeout`, or one of the application's verbs.
-2. Act on everything that :meth:`drain_effects` returns, in order.
+2. Act on everything that :meth:`drain_effects` returns, in order.  Datagrams are among it, unless the constructor is
+   told where they go: then they leave as they are made, and what they are made of is free for the next.
 3. Wait for the next input, at most until :meth:`next_deadline`; then call :meth:`handle_timeout`.
 
 ``now`` is a clock in seconds that never runs backward, the same for all calls; wall time and randomness are
@@ -134,8 +135,9 @@ class Participant:
         wall_clock: Callable[[], int],
         hooks: SecurityHooks = PLAINTEXT,
         trace: TraceSink | None = None,
+        send: Callable[[SendDatagram], None] | None = None,
     ) -> None:
-        """``wall_clock()``: nanoseconds since 1970.
+        """``wall_clock()``: nanoseconds since 1970.  ``send`` takes datagrams, and must not call the participant.
 
         Raises NotAllowedBySecurity if the hooks refuse the participant.
         """
@@ -171,7 +173,8 @@ class Participant:
         self.stateless_defrag_budget = DefragBudget(_STATELESS_DEFRAG_OCTETS)
         header = Header(PROTOCOL_VERSION, setup.config.vendor_id, self.guid.prefix).encode()
         self._max_message_octets = setup.max_message_octets
-        emit = self._emit_recorded if self.recorder.is_on else self._effects.append
+        self._send = send or self._effects.append
+        emit = self._send_recorded if self.recorder.is_on else self._send
         self.outbound = Outbound(header, setup.max_message_octets, setup.config.fragment_size, hooks, emit)
         self.inbound = Inbound(self)
         self.matchmaker = Matchmaker(self)
@@ -277,9 +280,9 @@ class Participant:
         """Is anything to be done at once?  Queued samples do not count until their message is full or due."""
         return bool(self._effects)
 
-    def _emit_recorded(self, effect: SendDatagram) -> None:
+    def _send_recorded(self, effect: SendDatagram) -> None:
         self.recorder.sent(effect)
-        self._effects.append(effect)
+        self._send(effect)
 
     def flush(self) -> None:
         """Send what is queued: several small samples may have been waiting for each other."""

@@ -39,9 +39,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Pump", "PumpOptions"]
 
-_KEPT_OCTETS = 2 << 20
+_KEPT_OCTETS = 8 << 20
 """glibc gives memory back to the system when 128 KiB lie free, and each large sample would fault its pages in anew.  A
-block of this size, once it is freed, lets it keep twice as much (mallopt(3), M_MMAP_THRESHOLD)."""
+block of this size, once it is freed, lets it keep twice as much (mallopt(3), M_MMAP_THRESHOLD): some samples of a MiB,
+which are there protected, in one piece and decoded."""
 _BATCH = 64
 _MAX_BACKLOG = 1024
 _OPERATIONS_BEFORE_YIELD = 64
@@ -84,6 +85,7 @@ class Pump:
                 wall_clock=time.time_ns,
                 hooks=load_hooks(options.properties, entropy=os.urandom, wall_clock=time.time_ns),
                 trace=trace,
+                send=self._send,
             )
         except BaseException:
             self._files.close()
@@ -340,9 +342,7 @@ class Pump:
 
     def _act_on(self, effects: list[Effect]) -> None:
         for effect in effects:
-            if isinstance(effect, SendDatagram):
-                self._send(effect)
-            elif isinstance(effect, Compute):
+            if isinstance(effect, Compute):
                 self._start_job(effect)
             else:
                 self._on_effect(effect)

@@ -12,7 +12,10 @@ from ddsi.messages.data import Data
 from ddsi.messages.interpreter import InfoTimestamp
 from ddsi.messages.raw_submessage import iterate_submessages
 from ddsi.simulation import Domain, LinkConditions, invariants
+from ddsi.spi import Octets
+from ddsi.spi.plaintext import Plaintext
 from ddsi.structure.cache_change import ChangeKind
+from ddsi.structure.guid import Guid
 from ddsi.structure.qos import Qos, reader_qos, writer_qos
 from ddsi.structure.qos_policies import (
     BestEffort,
@@ -67,6 +70,42 @@ def test_a_full_message_leaves_at_once() -> None:
     full = [effect for effect in participant.take_finished() if isinstance(effect, SendDatagram)]
     assert len(full) == 3
     assert all(sum(map(len, effect.parts)) <= 1452 for effect in full)
+
+
+def test_a_fragment_leaves_before_the_next_is_protected() -> None:
+    """Told where datagrams go, it has none among its effects, and they are those that it would have there."""
+    steps: list[str | bytes] = []
+
+    class Watched(Plaintext):
+        def encode_payload(self, writer: Guid, payload: Octets) -> Octets:
+            steps.append("protected")
+            return payload
+
+    def play(participant: Participant) -> list[bytes]:
+        writer = participant.create_writer("Square", "T", writer_qos(RELIABLE), 0.0, is_keyed=False)
+        stranger = Stranger()
+        stranger.introduce(participant)
+        participant.receive_datagram(stranger.sedp_reader(1, "Square", RELIABLE), stranger.address, 0.0)
+        participant.drain_effects()
+        steps.clear()
+        write(participant, writer, bytes(range(250)) * 20)
+        return [octets for _, octets in sent(participant)]
+
+    listed = play(engine())
+    assert len(listed) == 4
+    assert play(engine(hooks=Watched(), send=lambda effect: steps.append(b"".join(effect.parts)))) == []
+    datagrams = [step for step in steps if isinstance(step, bytes)]
+    assert datagrams == listed
+    assert steps == [
+        "protected",
+        datagrams[0],
+        "protected",
+        datagrams[1],
+        "protected",
+        datagrams[2],
+        "protected",
+        datagrams[3],
+    ]
 
 
 def test_source_timestamps_travel_with_each_sample() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from random import Random
 
 from ddsi.config import Config
@@ -28,7 +29,13 @@ OUR_USER_ADDRESS = Locator.udp_v4("10.0.0.1", 7411)
 GROUP = Locator.udp_v4("239.255.0.1", 7400)
 
 
-def engine(*, multicast: bool = True, config: Config | None = None, hooks: SecurityHooks = PLAINTEXT) -> Participant:
+def engine(
+    *,
+    multicast: bool = True,
+    config: Config | None = None,
+    hooks: SecurityHooks = PLAINTEXT,
+    send: Callable[[SendDatagram], None] | None = None,
+) -> Participant:
     """A participant that was just started, its first announcement drained."""
     participant = Participant(
         ParticipantSetup(
@@ -43,6 +50,7 @@ def engine(*, multicast: bool = True, config: Config | None = None, hooks: Secur
         random=Random(1),
         wall_clock=lambda: 1_700_000_000 * 10**9,
         hooks=hooks,
+        send=send,
     )
     participant.start(0.0)
     participant.handle_timeout(0.0)

@@ -84,11 +84,11 @@ async def test_what_the_buffer_does_not_take_waits_and_goes_in_order() -> None:
         part = bytearray(b"0")
         for number in range(3):
             part[0] = ord(f"{number}")
-            pump._act_on([SendDatagram((SOMEBODY,), [part, b"!"])])
+            pump._send(SendDatagram((SOMEBODY,), [part, b"!"]))
         assert gate.sent == []
         gate.is_open = True
         part[0] = ord("x")  # what waits was copied
-        pump._act_on([SendDatagram((SOMEBODY,), [b"3!"])])
+        pump._send(SendDatagram((SOMEBODY,), [b"3!"]))
         with trio.fail_after(2):
             while len(gate.sent) < 4:
                 await trio.sleep(0.001)
@@ -101,7 +101,7 @@ async def test_what_waits_is_bounded_and_what_is_dropped_is_counted() -> None:
         gate = Gate(pump)
         gate.is_open = False
         for _ in range(1500):
-            pump._act_on([SendDatagram((SOMEBODY,), [b"octets"])])
+            pump._send(SendDatagram((SOMEBODY,), [b"octets"]))
         assert pump.dropped_at_send == 1500 - 1024
         assert len(pump._backlog) == 1024
 
@@ -112,7 +112,7 @@ async def test_a_backlog_from_before_the_first_task_ran_is_sent() -> None:
     gate = Gate(pump)
     gate.is_open = False
     pump.start()
-    pump._act_on([SendDatagram((SOMEBODY,), [b"early"])])
+    pump._send(SendDatagram((SOMEBODY,), [b"early"]))
     gate.is_open = True
     async with trio.open_nursery() as nursery:
         nursery.start_soon(pump.run)
@@ -316,7 +316,7 @@ async def test_what_waits_for_a_socket_that_is_closed_goes_through_another() -> 
     async with running() as pump:
         gate = Gate(pump)
         gate.is_open = False
-        pump._act_on([SendDatagram((SOMEBODY,), [b"patient"])])
+        pump._send(SendDatagram((SOMEBODY,), [b"patient"]))
         await trio.sleep(0.01)
         pump.transport._list_interfaces = lambda: [there]
         pump.follow_interfaces()
