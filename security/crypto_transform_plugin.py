@@ -168,8 +168,8 @@ class SealsAlike(Protocol):
 
     def payload_sealer(
         self, sending_datawriter_crypto: DatawriterCryptoHandle
-    ) -> Callable[[Octets], Parts | Refused] | None:
-        """The same for a writer's payloads."""
+    ) -> Callable[[Octets], Octets | Refused] | None:
+        """The same for a writer's payloads, in one part."""
         ...
 
 

@@ -52,7 +52,7 @@ _SMALL: Final = 1 << 12
 
 
 Encoder = Callable[[Parts], Parts | Refused]
-PayloadEncoder = Callable[[Octets], Parts | Refused]
+PayloadEncoder = Callable[[Octets], Octets | Refused]
 Opener = Callable[[Octets], Octets | None]
 PayloadOpener = Callable[[Octets, memoryview | None], Octets | None]
 EnvelopeOpener = Callable[[memoryview, int, int], tuple[Octets, int] | None]
@@ -128,17 +128,24 @@ class Protection:
             return payload
         encoded = encode(payload)
         assert not isinstance(encoded, Refused), encoded
-        return encoded[0] if len(encoded) == 1 else b"".join(encoded)
+        return encoded
 
     def _payload_encoder(self, writer: Guid) -> PayloadEncoder | None:
         """The same for every payload of this writer; None where they are not protected."""
         endpoint = self._local_endpoints.get(writer)
         if endpoint is None or not endpoint.attributes.is_payload_protected:
             return None
-        handle, encode = endpoint.handle, self._cryptographic.encode_serialized_payload
+        handle, general_way = endpoint.handle, self._cryptographic.encode_serialized_payload
         assert isinstance(handle, DatawriterCryptoHandle), "a writer whose payload is protected has keys"
         short = None if self._sealing is None else self._sealing.payload_sealer(handle)
-        return short or (lambda payload: encode(bytearray(), payload, handle))
+        if short is not None:
+            return short
+
+        def encode(payload: Octets) -> Octets | Refused:
+            encoded = general_way(bytearray(), payload, handle)
+            return encoded if isinstance(encoded, Refused) else b"".join(encoded)
+
+        return encode
 
     def encode_submessage(self, sender: Guid, receivers: tuple[Guid, ...], submessage: Parts) -> Parts:
         key = (sender, receivers)

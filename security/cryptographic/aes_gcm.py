@@ -15,7 +15,7 @@ from ddsi.serialization.cursor import Octets
 
 from .rooms import Rooms
 
-__all__ = ["LARGE", "decrypt_joined", "decrypt_sealed", "decrypter_into", "encrypt_into"]
+__all__ = ["LARGE", "decrypt_joined", "decrypt_sealed", "decrypter_into", "encrypter_into"]
 
 LARGE: Final = 1 << 14
 """From so many octets on it pays to spare copies: one of 64 KiB takes a fifth of the time that encrypting them does."""
@@ -24,17 +24,23 @@ _TAG_LENGTH: Final = 16
 _HAS_INTO: Final = hasattr(AESGCM, "encrypt_into") and hasattr(AESGCM, "decrypt_into")
 """cryptography has them since version 47."""
 
+Into = Callable[[bytes, Octets, None, memoryview], object]
+"""With a nonce, of these octets, and no others, into a room."""
 
-def encrypt_into(aead: AESGCM, nonce: bytes, plain: Octets, room: memoryview) -> None:
-    """Into ``room``, which is 16 octets longer: the cipher text and its tag."""
+
+def encrypter_into(aead: AESGCM) -> Into:
+    """``encrypt_into`` of the library, or what does the same: the room is 16 octets longer than what is encrypted."""
     if _HAS_INTO:
-        aead.encrypt_into(nonce, plain, None, room)
-    else:
-        room[:] = aead.encrypt(nonce, plain, None)
+        return aead.encrypt_into
+
+    def encrypt_into(nonce: bytes, plain: Octets, nothing: None, room: memoryview) -> None:
+        room[:] = aead.encrypt(nonce, plain, nothing)
+
+    return encrypt_into
 
 
-def decrypter_into(aead: AESGCM) -> Callable[[bytes, Octets, None, memoryview], object]:
-    """``decrypt_into`` of the library, or what does the same: nonce, octets with their tag, nothing, where to.
+def decrypter_into(aead: AESGCM) -> Into:
+    """The same of ``decrypt_into``, which is given octets with their tag.
 
     It raises cryptography's InvalidTag, and then there is anything.
     """

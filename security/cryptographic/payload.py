@@ -20,7 +20,7 @@ from cryptography.exceptions import InvalidTag
 from ddsi.spi import Octets, Outcome, Parts, Refused, Rejected
 from ddsi.structure.errors import MalformedMessage
 
-from .aes_gcm import LARGE, decrypt_sealed, encrypt_into
+from .aes_gcm import LARGE, decrypt_sealed
 from .received_keys import KeyRing, ReceivedKey
 from .rooms import Rooms
 from .session_keys import NONCE_AT, SendingKey
@@ -58,7 +58,7 @@ def encode_payload(plain: Octets, key: SendingKey, rooms: Rooms) -> Parts | Refu
             return head, key.aead.encrypt(nonce, plain, None), _NO_MACS
         room = rooms.room(_CONTENT_AT + length + _FOOTER_LENGTH)
         room[:_CONTENT_AT] = head
-        encrypt_into(key.aead, nonce, plain, room[_CONTENT_AT:-4])
+        key.encrypt_into(nonce, plain, None, room[_CONTENT_AT:-4])
         room[-4:] = _NO_MACS
         return (room,)
     return header, plain, key.aead.encrypt(nonce, b"", plain) + _NO_MACS

@@ -8,12 +8,13 @@ each pair against each other.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from typing import Final
 
 from ddsi.spi import Octets, Parts, Refused
 
-from .aes_gcm import LARGE, encrypt_into
+from .aes_gcm import LARGE
 from .envelope import LONGEST_BODY, MESSAGE, SUBMESSAGE, body_head
 from .payload import USED_UP, encode_payload
 from .rooms import Rooms
@@ -24,40 +25,51 @@ from .transformation import HEADER_LENGTH, MAC_LENGTH
 __all__ = ["PayloadSealer", "Sealer", "message_sealer", "payload_sealer", "submessage_sealer"]
 
 Sealer = Callable[[Parts], Parts | Refused]
-PayloadSealer = Callable[[Octets], Parts | Refused]
+PayloadSealer = Callable[[Octets], Octets | Refused]
 
 _LONGEST: Final = LONGEST_BODY - 4
 _NO_MACS: Final = bytes(4)
+_length: Final = struct.Struct(">I").pack
 _CONTENT_AT: Final = HEADER_LENGTH + 4
 _AROUND: Final = _CONTENT_AT + MAC_LENGTH + len(_NO_MACS)
 
 
-def submessage_sealer(key: SendingKey) -> Sealer:
-    """Does what :func:`~.sealing.seal_submessage` does with this key."""
+def submessage_sealer(key: SendingKey, rooms: Rooms) -> Sealer:
+    """Does what :func:`~.sealing.seal_submessage` does with this key; what is large lies in one of ``rooms``."""
     if not key.encrypts:
         return lambda submessage: seal_submessage(submessage, key, ())
     prefix_head, postfix_head = SUBMESSAGE.prefix_head, SUBMESSAGE.postfix_head
 
     def seal(submessage: Parts) -> Parts | Refused:
-        body = submessage[0] if len(submessage) == 1 else b"".join(submessage)
+        body: Octets
+        if len(submessage) == 1:
+            body = submessage[0]
+        elif len(submessage) == 3 and len(submessage[1]) >= LARGE:
+            body = rooms.around(*submessage)
+        else:
+            body = b"".join(submessage)
         length = len(body)
         if length > _LONGEST or length & 3:
             return seal_submessage((body,), key, ())
         header = key.next_header(length)
         if header is None:
             return USED_UP
-        sealed = key.aead.encrypt(header[NONCE_AT:], body, None)
-        return (
-            prefix_head + header + body_head(length),
-            memoryview(sealed)[:-MAC_LENGTH],
-            postfix_head + sealed[-MAC_LENGTH:] + _NO_MACS,
-        )
+        content: Octets
+        if length < LARGE:
+            sealed = key.aead.encrypt(header[NONCE_AT:], body, None)
+            content, mac = memoryview(sealed)[:-MAC_LENGTH], sealed[-MAC_LENGTH:]
+        else:
+            room = rooms.room(length + MAC_LENGTH)
+            key.encrypt_into(header[NONCE_AT:], body, None, room)
+            mac = bytes(room[-MAC_LENGTH:])
+            content = rooms.shortened(room, MAC_LENGTH)
+        return prefix_head + header + body_head(length), content, postfix_head + mac + _NO_MACS
 
     return seal
 
 
-def message_sealer(key: SendingKey) -> Sealer:
-    """Does what :func:`~.sealing.seal_message` does with this key."""
+def message_sealer(key: SendingKey, rooms: Rooms) -> Sealer:
+    """Does what :func:`~.sealing.seal_message` does with this key; what is large may lie in one of ``rooms``."""
     if key.encrypts:
         return lambda message: seal_message(message, key, ())
     prefix_head, postfix_head = MESSAGE.prefix_head, MESSAGE.postfix_head
@@ -66,7 +78,12 @@ def message_sealer(key: SendingKey) -> Sealer:
         first = message[0]
         if not HEADER_LENGTH <= len(first) < LARGE:
             return seal_message(message, key, ())
-        body = b"".join((INFO_SRC_HEAD, first[4:], *message[1:]))
+        body: Octets
+        if len(message) > 2 and len(message[-2]) >= LARGE:
+            # A sealed submessage, behind little else.
+            body = rooms.around(b"".join((INFO_SRC_HEAD, first[4:], *message[1:-2])), message[-2], message[-1])
+        else:
+            body = b"".join((INFO_SRC_HEAD, first[4:], *message[1:]))
         length = len(body)
         if length & 3:
             return seal_message(message, key, ())
@@ -82,20 +99,29 @@ def message_sealer(key: SendingKey) -> Sealer:
 def payload_sealer(key: SendingKey, rooms: Rooms) -> PayloadSealer:
     """Does what :func:`~.payload.encode_payload` does with this key, in one part."""
 
-    def seal(plain: Octets) -> Parts | Refused:
+    def general(plain: Octets) -> Octets | Refused:
+        encoded = encode_payload(plain, key, rooms)
+        if isinstance(encoded, Refused):
+            return encoded
+        return encoded[0] if len(encoded) == 1 else b"".join(encoded)
+
+    if not key.encrypts:
+        return general
+
+    def seal(plain: Octets) -> Octets | Refused:
         length = len(plain)
-        if length & 3 or not key.encrypts:
-            return encode_payload(plain, key, rooms)
+        if length & 3:
+            return general(plain)
         header = key.next_header(length)
         if header is None:
             return USED_UP
-        head = header + length.to_bytes(4, "big")
+        head = header + _length(length)
         if length < LARGE:
-            return (head + key.aead.encrypt(header[NONCE_AT:], plain, None) + _NO_MACS,)
+            return head + key.aead.encrypt(header[NONCE_AT:], plain, None) + _NO_MACS
         room = rooms.room(_AROUND + length)
         room[:_CONTENT_AT] = head
-        encrypt_into(key.aead, header[NONCE_AT:], plain, room[_CONTENT_AT:-4])
+        key.encrypt_into(header[NONCE_AT:], plain, None, room[_CONTENT_AT:-4])
         room[-4:] = _NO_MACS
-        return (room,)
+        return room
 
     return seal

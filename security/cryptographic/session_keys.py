@@ -25,6 +25,7 @@ from typing import Final
 
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
+from .aes_gcm import encrypter_into
 from .key_material import KeyMaterial
 
 __all__ = [
@@ -63,7 +64,7 @@ def session_receiver_key(master: bytearray, material: KeyMaterial, session_id: b
 
 
 class SendingKey:
-    """A key of ours with its current session.  ``aead`` is of that session, and changes with ``session_id``.
+    """A key of ours with its current session.  ``aead`` and ``encrypt_into`` are of it, and change with ``session_id``.
 
     Invariant: of two headers that it hands out, no two are equal.
     """
@@ -78,6 +79,7 @@ class SendingKey:
         "_session_began_at",
         "_side",
         "aead",
+        "encrypt_into",
         "encrypts",
         "material",
         "session_id",
@@ -104,7 +106,7 @@ class SendingKey:
     def next_header(self, octets: int) -> bytes | None:
         """The CryptoHeader of one operation over so many octets, never given out before; None: the key is used up.
 
-        Its last 12 octets, from NONCE_AT on, are the nonce; read ``aead`` and ``session_id`` after this, not before.
+        Its last 12 octets, from NONCE_AT on, are the nonce; what is of the session is read after this, not before.
         """
         self._blocks_left -= (octets >> 4) + 1
         if self._blocks_left < 0 and not self._end_session((octets >> 4) + 1):
@@ -132,6 +134,7 @@ class SendingKey:
         self._blocks_left = blocks
         self.session_id = session.to_bytes(4, "big")
         self.aead = AESGCM(session_key(self.material, self.session_id))
+        self.encrypt_into = encrypter_into(self.aead)
         self._head = self.material.kind.to_wire() + self.material.sender_key_id + self.session_id
 
     def __repr__(self) -> str:

@@ -113,7 +113,7 @@ class AesGcmGmacTransform:
         key, protection = sending_participant_crypto.key, sending_participant_crypto.protection
         if key is None or protection is None or protection.origin_authenticated:
             return None
-        return sealers.message_sealer(key)
+        return sealers.message_sealer(key, sending_participant_crypto.rooms)
 
     def submessage_sealer(
         self,
@@ -126,11 +126,11 @@ class AesGcmGmacTransform:
         key, protection = sender.submessage_key, sender.submessage
         if sender.is_volatile or key is None or protection is None or protection.origin_authenticated:
             return None
-        return sealers.submessage_sealer(key)
+        return sealers.submessage_sealer(key, sender.participant.rooms)
 
     def payload_sealer(
         self, sending_datawriter_crypto: DatawriterCryptoHandle
-    ) -> Callable[[Octets], Parts | Refused] | None:
+    ) -> Callable[[Octets], Octets | Refused] | None:
         """Not the OMG's: :class:`~ddsi_security.crypto_transform_plugin.SealsAlike`."""
         writer = sending_datawriter_crypto
         assert isinstance(writer, LocalWriter)

@@ -26,7 +26,7 @@ def _has_into(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize("kind", [bytes, bytearray, memoryview])
 def test_into_a_room_and_out_of_it(size: int, kind: type) -> None:
     plain, room = random.Random(size).randbytes(size), memoryview(bytearray(size + 16))
-    aes_gcm.encrypt_into(AEAD, NONCE, kind(plain), room)
+    aes_gcm.encrypter_into(AEAD)(NONCE, kind(plain), None, room)
     assert room == AEAD.encrypt(NONCE, plain, None)
     found, decrypt_into = memoryview(bytearray(size)), aes_gcm.decrypter_into(AEAD)
     decrypt_into(NONCE, room, None, found)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from ddsi_security.cryptographic.rooms import Rooms
 
 
@@ -43,3 +45,49 @@ def test_what_was_decrypted_last_can_be_wiped() -> None:
     room[:] = b"x" * 100
     rooms.wipe()
     assert not any(room)
+
+
+def test_what_goes_around_a_room_is_written_there() -> None:
+    rooms = Rooms()
+    room = rooms.room(1000)
+    room[:] = b"r" * 1000
+    joined = rooms.around(b"before", room, b"behind")
+    assert joined == b"before" + b"r" * 1000 + b"behind"
+    assert isinstance(joined, memoryview)
+    assert address(joined) == address(room)
+
+
+def test_the_end_of_a_room_may_be_given_up() -> None:
+    rooms = Rooms()
+    room = rooms.room(1016)
+    room[:] = b"r" * 1000 + b"t" * 16
+    part = rooms.shortened(room, 16)
+    joined = rooms.around(b"before", part, b"behind")
+    assert joined == b"before" + b"r" * 1000 + b"behind"
+    assert isinstance(joined, memoryview)
+    assert address(joined) == address(room)
+
+
+@pytest.mark.parametrize(("before", "behind"), [(257, 0), (0, 65), (1 << 16, 1 << 16)])
+def test_what_has_no_space_around_a_room_is_joined_with_it(before: int, behind: int) -> None:
+    rooms = Rooms()
+    room = rooms.room(1 << 16)
+    joined = rooms.around(b"b" * before, room, b"e" * behind)
+    assert joined == b"b" * before + bytes(room) + b"e" * behind
+    assert isinstance(joined, bytes)
+
+
+def test_nothing_is_written_around_a_room_twice_nor_around_a_part_of_it_nor_around_an_earlier_one() -> None:
+    rooms = Rooms()
+    room = rooms.room(100)
+    first = rooms.around(b"first", room, b"")
+    assert rooms.around(b"other", room, b"") == b"other" + bytes(room)
+    assert first == b"first" + bytes(room), "whoever has it sees nothing else"
+    room = rooms.room(100)
+    assert isinstance(rooms.around(b"b", room[:50], b""), bytes)
+    later = rooms.room(100)
+    assert isinstance(rooms.around(b"b", room, b""), bytes)
+    assert isinstance(rooms.around(b"b", later, b""), memoryview)
+    large = rooms.room(1 << 17)
+    assert isinstance(rooms.around(b"b", large, b""), bytes)
+    assert isinstance(rooms.around(b"b", b"octets", b""), bytes)
