@@ -78,13 +78,11 @@ class _Encrypted:
         self._room = rooms.room
 
     def content(self, octets: Octets, start: int, end: int) -> Octets | None:
-        """What lies in the envelope ``octets[start:end]``; else None, and the octets are as they were.
+        """What lies in the envelope ``octets[start:end]``, which is small; else None, and the octets are as they were.
 
         None also where they were altered: the general way says in what.
         """
         length = end - start
-        if length >= LARGE:
-            return self._large_content(memoryview(octets), start, end)
         if length < _LEAST:
             return None
         take_apart, expected_head = _layout(length)
@@ -96,7 +94,7 @@ class _Encrypted:
         except InvalidTag:
             return None
 
-    def _large_content(self, octets: memoryview, start: int, end: int) -> Octets | None:
+    def large_content(self, octets: memoryview, start: int, end: int) -> Octets | None:
         """Without copying, where ``octets`` can be written to: the MAC goes for a while to where AES-GCM wants it."""
         take_apart, expected_head = _large_layout(end - start)
         nonce, head, postfix_head, mac, count = take_apart(octets, start)
@@ -157,7 +155,10 @@ class SubmessageOpener(_Encrypted):
         past = start + _AROUND_BODY + _LENGTH.unpack_from(octets, start + _LENGTH_AT)[0]
         if past > end:
             return None
-        plain = self.content(octets, start, past)
+        plain = (
+            self.content(octets, start, past) if past - start < LARGE
+            else self.large_content(memoryview(octets), start, past)
+        )  # fmt: skip
         if plain is None:
             return None
         kind, flags, length = HEAD.unpack_from(plain)
@@ -175,13 +176,18 @@ class MessageOpener(_Encrypted):
 
     def open(self, octets: Octets) -> Octets | None:
         """The message, with its header; else None, and ``octets`` are as they were."""
-        octets = bytes(octets) if len(octets) < LARGE else memoryview(octets)
-        plain = self.content(octets, _RTPS_HEADER, len(octets))
+        length = len(octets)
+        if length < LARGE:
+            octets = bytes(octets)
+            plain = self.content(octets, _RTPS_HEADER, length)
+        else:
+            octets = memoryview(octets)
+            plain = self.large_content(octets, _RTPS_HEADER, length)
         if plain is None:
             return None
         message = as_message(plain, octets)
         if isinstance(message, Outcome):
-            self._put_back(octets, _RTPS_HEADER, len(octets))
+            self._put_back(octets, _RTPS_HEADER, length)
             return None
         return message
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Final
 
 from ddsi.spi import Octets, Parts, Refused
@@ -28,6 +29,8 @@ Sealer = Callable[[Parts], Parts | Refused]
 PayloadSealer = Callable[[Octets], Octets | Refused]
 
 _LONGEST: Final = LONGEST_BODY - 4
+_LONGEST_HEAD: Final = 64
+"""A message's header, and an INFO_DST."""
 _NO_MACS: Final = bytes(4)
 _length: Final = struct.Struct(">I").pack
 _CONTENT_AT: Final = HEADER_LENGTH + 4
@@ -72,18 +75,19 @@ def message_sealer(key: SendingKey, rooms: Rooms) -> Sealer:
     """Does what :func:`~.sealing.seal_message` does with this key; what is large may lie in one of ``rooms``."""
     if key.encrypts:
         return lambda message: seal_message(message, key, ())
-    prefix_head, postfix_head = MESSAGE.prefix_head, MESSAGE.postfix_head
+    postfix_head = MESSAGE.postfix_head
 
     def seal(message: Parts) -> Parts | Refused:
         first = message[0]
-        if not HEADER_LENGTH <= len(first) < LARGE:
+        if not HEADER_LENGTH <= len(first) <= _LONGEST_HEAD:
             return seal_message(message, key, ())
+        outside, inside = _heads(bytes(first))
         body: Octets
         if len(message) > 2 and len(message[-2]) >= LARGE:
             # A sealed submessage, behind little else.
-            body = rooms.around(b"".join((INFO_SRC_HEAD, first[4:], *message[1:-2])), message[-2], message[-1])
+            body = rooms.around(b"".join((inside, *message[1:-2])), message[-2], message[-1])
         else:
-            body = b"".join((INFO_SRC_HEAD, first[4:], *message[1:]))
+            body = b"".join((inside, *message[1:]))
         length = len(body)
         if length & 3:
             return seal_message(message, key, ())
@@ -91,9 +95,15 @@ def message_sealer(key: SendingKey, rooms: Rooms) -> Sealer:
         if header is None:
             return USED_UP
         mac = key.aead.encrypt(header[NONCE_AT:], b"", body)
-        return bytes(first[:HEADER_LENGTH]) + prefix_head + header, body, postfix_head + mac + _NO_MACS
+        return outside + header, body, postfix_head + mac + _NO_MACS
 
     return seal
+
+
+@lru_cache(maxsize=256)
+def _heads(first: bytes) -> tuple[bytes, bytes]:
+    """How a message, protected, begins that begins like this, up to its CryptoHeader; and how what is in it does."""
+    return first[:HEADER_LENGTH] + MESSAGE.prefix_head, INFO_SRC_HEAD + first[4:]
 
 
 def payload_sealer(key: SendingKey, rooms: Rooms) -> PayloadSealer:
