@@ -32,6 +32,7 @@ __all__ = [
     "MessageOpener",
     "PayloadOpener",
     "SignedMessageOpener",
+    "SignedSubmessageOpener",
     "SubmessageOpener",
     "message_opener",
     "payload_opener",
@@ -54,6 +55,10 @@ _AROUND: Final = _CONTENT_AT + _FOOT
 _LEAST: Final = _AROUND + 4
 _AFTER_MAC: Final = len(_NO_MACS) + 4
 """What of the postfix lies behind the MAC while it is where AES-GCM wants it: that is where the header was."""
+_SIGNED_HEAD: Final = struct.Struct("<12x12sBBH")
+"""Of a signed submessage: the nonce, and its own header, little-endian."""
+_SIGNED_FOOT: Final = struct.Struct(f"4s{MAC_LENGTH}s4s")
+_LEAST_SIGNED_SUBMESSAGE: Final = _SIGNED_HEAD.size + _FOOT
 _LENGTH: Final = struct.Struct("<H")
 _LENGTH_AT: Final = _BODY_AT + 2
 """Of SEC_BODY."""
@@ -169,6 +174,35 @@ class SubmessageOpener(_Encrypted):
         return plain, past
 
 
+class SignedSubmessageOpener:
+    """The same of submessages that are signed."""
+
+    __slots__ = ("_encrypt", "_entity_id")
+
+    def __init__(self, entity_id: bytes, aead: AESGCM) -> None:
+        self._encrypt = aead.encrypt
+        self._entity_id = entity_id
+
+    def open(self, octets: Octets, start: int, end: int) -> tuple[Octets, int] | None:
+        """As :meth:`SubmessageOpener.open`.  Large octets are not copied."""
+        if end - start < _LEAST_SIGNED_SUBMESSAGE:
+            return None
+        nonce, kind, flags, length = _SIGNED_HEAD.unpack_from(octets, start)
+        body = start + _BODY_AT
+        foot = body + HEAD.size + length
+        at = SENDER_AT.get(kind)
+        if at is None or not flags & 1 or length & 3 or foot + _FOOT > end:
+            return None
+        postfix_head, mac, count = _SIGNED_FOOT.unpack_from(octets, foot)
+        signed = octets[body:foot] if foot - body >= LARGE else bytes(octets[body:foot])
+        if (
+            postfix_head != SUBMESSAGE.postfix_head or count != _NO_MACS or signed[at : at + 4] != self._entity_id
+            or not compare_digest(self._encrypt(nonce, b"", signed), mac)
+        ):  # fmt: skip
+            return None
+        return signed, foot + _FOOT
+
+
 class MessageOpener(_Encrypted):
     """For messages that follow their header with the same 16 octets, and end with SRTPS_POSTFIX: encrypted ones."""
 
@@ -273,11 +307,13 @@ def message_opener(
 
 def submessage_opener(
     octets: Octets, ring: KeyRing, expected: Protection | None, entity_id: bytes
-) -> SubmessageOpener | None:
-    """As :func:`message_opener`, of a submessage that is encrypted."""
+) -> SubmessageOpener | SignedSubmessageOpener | None:
+    """As :func:`message_opener`, of a submessage of the entity with this id."""
     session = _session(octets[4:16], ring, expected)
-    if session is None or expected is None or not expected.encrypted or octets[:4] != SUBMESSAGE.prefix_head:
+    if session is None or expected is None or octets[:4] != SUBMESSAGE.prefix_head:
         return None
+    if not expected.encrypted:
+        return SignedSubmessageOpener(entity_id, session.aead)
     return SubmessageOpener(entity_id, session.aead, ring.rooms)
 
 

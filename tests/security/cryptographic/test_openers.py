@@ -11,6 +11,7 @@ from ddsi_security.cryptographic.aes_gcm import LARGE
 from ddsi_security.cryptographic.openers import (
     MessageOpener,
     SignedMessageOpener,
+    SignedSubmessageOpener,
     SubmessageOpener,
     message_opener,
     payload_opener,
@@ -26,7 +27,11 @@ from ddsi_security.cryptographic.transformation import Protection, Transformatio
 from tests.security.cryptographic.keys import material, octets_of, ring, sending_key
 
 ENCRYPTED = Protection(encrypted=True)
+SIGNED = Protection(encrypted=False)
+KINDS = {ENCRYPTED: TransformationKind.AES256_GCM, SIGNED: TransformationKind.AES256_GMAC}
+EITHER = pytest.mark.parametrize("expected", [ENCRYPTED, SIGNED], ids=["encrypted", "signed"])
 SIZES = (8, 400, LARGE - 60, LARGE - 56, 65_000)
+NOBODY = bytes(4)
 
 
 def submessage(size: int, kind: int = 0x15, flags: int = 5) -> bytes:
@@ -37,14 +42,25 @@ def sealed(plain: bytes, key: SendingKey) -> bytes:
     return octets_of(seal_submessage((plain,), key, ()))
 
 
-def opener_of(first: bytes, keys: KeyRing, entity_id: bytes = bytes(4)) -> SubmessageOpener:
-    assert open_submessage(first, keys, ENCRYPTED) is not None
-    found = submessage_opener(first, keys, ENCRYPTED, entity_id)
+# --- submessages -----------------------------------------------------------------------------------------------------
+
+
+def keys_for(expected: Protection) -> tuple[KeyRing, SendingKey]:
+    of = material(KINDS[expected])
+    return ring(of), sending_key(of)
+
+
+def opener_for(
+    expected: Protection, keys: KeyRing, key: SendingKey, entity_id: bytes = NOBODY
+) -> SubmessageOpener | SignedSubmessageOpener:
+    first = sealed(submessage(24), key)
+    assert open_submessage(first, keys, expected) == submessage(24)
+    found = submessage_opener(first, keys, expected, entity_id)
     assert found is not None
     return found
 
 
-def opened(opener: SubmessageOpener, octets: Octets) -> Octets | None:
+def opened(opener: SubmessageOpener | SignedSubmessageOpener, octets: Octets) -> Octets | None:
     """What is in the envelope that these are."""
     found = opener.open(octets, 0, len(octets))
     if found is None:
@@ -54,21 +70,23 @@ def opened(opener: SubmessageOpener, octets: Octets) -> Octets | None:
     return plain
 
 
+@EITHER
 @pytest.mark.parametrize("size", [24, *SIZES[1:]])
 @pytest.mark.parametrize("kind", [bytes, bytearray, lambda octets: memoryview(bytearray(octets)), memoryview])
-def test_it_opens_what_follows_in_the_same_session(size: int, kind: type) -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
+def test_it_opens_what_follows_in_the_same_session(size: int, kind: type, expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    opener = opener_for(expected, keys, key)
     found = opened(opener, kind(sealed(submessage(size), key)))
     assert found is not None
     assert bytes(found) == submessage(size)
 
 
+@EITHER
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("at", [12, 24, 26, 28, 40, -24, -20, -5, -1])
-def test_what_was_altered_is_left_to_the_general_way_and_as_it_was(size: int, at: int) -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
+def test_what_was_altered_is_left_to_the_general_way_and_as_it_was(size: int, at: int, expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    opener = opener_for(expected, keys, key)
     altered = bytearray(sealed(submessage(max(size, 16)), key))
     altered[at] ^= 1
     before = bytes(altered)
@@ -77,15 +95,17 @@ def test_what_was_altered_is_left_to_the_general_way_and_as_it_was(size: int, at
     assert altered == before
 
 
-@pytest.mark.parametrize("length", [1, 16, 32, 56, 58, 60])
-def test_octets_that_end_too_soon_are_none(length: int) -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
+@EITHER
+@pytest.mark.parametrize("length", [1, 16, 27, 28, 32, 51, 52, 56, 58, 60])
+def test_octets_that_end_too_soon_are_none(length: int, expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    opener = opener_for(expected, keys, key)
     octets = sealed(submessage(24), key)
     assert opened(opener, octets[:length]) is None
     assert opened(opener, octets[-length:]) is None
 
 
+@EITHER
 @pytest.mark.parametrize(
     "plain",
     [
@@ -93,19 +113,29 @@ def test_octets_that_end_too_soon_are_none(length: int) -> None:
         submessage(24, kind=0x31),
         submessage(24)[:2] + bytes(2) + submessage(24)[4:],
         submessage(24) + bytes(4),
+        submessage(24)[:2] + b"\xff\xff" + submessage(24)[4:],
+        submessage(8),
     ],
-    ids=["big-endian", "an envelope", "of length 0", "two submessages"],
+    ids=[
+        "big-endian",
+        "an envelope",
+        "of length 0",
+        "two submessages",
+        "longer than it is",
+        "too short for its sender",
+    ],
 )
-def test_unusual_submessages_are_left_to_the_general_way(plain: bytes) -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
+def test_unusual_submessages_are_left_to_the_general_way(plain: bytes, expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    opener = opener_for(expected, keys, key)
     assert opened(opener, sealed(plain, key)) is None
 
 
+@EITHER
 @pytest.mark.parametrize("size", SIZES[1:])
-def test_it_opens_what_lies_in_the_middle_of_a_message(size: int) -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
+def test_it_opens_what_lies_in_the_middle_of_a_message(size: int, expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    opener = opener_for(expected, keys, key)
     envelope = sealed(submessage(size), key)
     message = memoryview(bytearray(b"before" + envelope + b"behind"))
     end = 6 + len(envelope)
@@ -118,65 +148,58 @@ def test_it_opens_what_lies_in_the_middle_of_a_message(size: int) -> None:
     assert message == before
 
 
+@EITHER
 @pytest.mark.parametrize("size", SIZES[1:])
 @pytest.mark.parametrize("kind", [0x15, 0x16, 0x07, 0x13, 0x08, 0x06, 0x12])
-def test_it_opens_nothing_that_names_another_sender(size: int, kind: int) -> None:
-    keys, key = ring(material()), sending_key()
-    first = sealed(submessage(24), key)
+def test_it_opens_nothing_that_names_another_sender(size: int, kind: int, expected: Protection) -> None:
+    keys, key = keys_for(expected)
     octets = memoryview(bytearray(sealed(submessage(size, kind), key)))
     before = bytes(octets)
-    assert opened(opener_of(first, keys, b"\0\0\1\2"), octets) is None
+    assert opened(opener_for(expected, keys, key, b"\0\0\1\2"), octets) is None
     assert octets == before
-    assert opened(opener_of(first, keys), octets) == submessage(size, kind)
+    assert opened(opener_for(expected, keys, key), octets) == submessage(size, kind)
 
 
-def test_what_names_no_sender_is_left_to_the_general_way() -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
-    assert opened(opener, sealed(submessage(12, kind=0x09), key)) is None
+@EITHER
+def test_what_names_no_sender_is_left_to_the_general_way(expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    assert opened(opener_for(expected, keys, key), sealed(submessage(12, kind=0x09), key)) is None
 
 
-def test_the_general_way_opens_large_ones_that_are_big_endian() -> None:
-    keys, key = ring(material()), sending_key()
-    opener = opener_of(sealed(submessage(24), key), keys)
+@EITHER
+def test_the_general_way_opens_large_ones_that_are_big_endian(expected: Protection) -> None:
+    keys, key = keys_for(expected)
     plain = struct.pack(">BBH", 0x15, 4, 40_000) + bytes(40_000)
     octets = memoryview(bytearray(sealed(plain, key)))
     before = bytes(octets)
-    assert opened(opener, octets) is None
+    assert opened(opener_for(expected, keys, key), octets) is None
     assert octets == before
-    assert open_submessage(octets, keys, ENCRYPTED) == plain
+    assert open_submessage(octets, keys, expected) == plain
 
 
-def test_there_is_none_where_more_is_asked_for_than_encryption_for_all() -> None:
-    keys, first = ring(material()), sealed(submessage(24), sending_key())
-    assert submessage_opener(first, keys, ENCRYPTED, bytes(4)) is None, "nothing was opened in this session yet"
-    assert open_submessage(first, keys, ENCRYPTED) is not None
-    assert submessage_opener(first, keys, ENCRYPTED, bytes(4)) is not None
-    assert submessage_opener(first, keys, None, bytes(4)) is None
-    assert submessage_opener(first, keys, Protection(encrypted=False), bytes(4)) is None
-    assert submessage_opener(first, keys, Protection(encrypted=True, origin_authenticated=True), bytes(4)) is None
-    assert submessage_opener(first[:8] + b"\x99" * 4 + first[12:], keys, ENCRYPTED, bytes(4)) is None
+@EITHER
+def test_there_is_none_where_more_is_asked_for_than_protection_for_all(expected: Protection) -> None:
+    keys, key = keys_for(expected)
+    first = sealed(submessage(24), key)
+    assert submessage_opener(first, keys, expected, NOBODY) is None, "nothing was opened in this session yet"
+    assert open_submessage(first, keys, expected) is not None
+    assert submessage_opener(first, keys, expected, NOBODY) is not None
+    assert submessage_opener(first, keys, None, NOBODY) is None
+    assert submessage_opener(first, keys, SIGNED if expected is ENCRYPTED else ENCRYPTED, NOBODY) is None
+    of_one = Protection(encrypted=expected.encrypted, origin_authenticated=True)
+    assert submessage_opener(first, keys, of_one, NOBODY) is None
+    assert submessage_opener(first[:8] + b"\x99" * 4 + first[12:], keys, expected, NOBODY) is None
 
 
 def test_there_is_none_while_a_key_is_being_replaced() -> None:
     keys, first = ring(material()), sealed(submessage(24), sending_key())
     assert open_submessage(first, keys, ENCRYPTED) is not None
     keys.replace(material(TransformationKind.AES256_GMAC))
-    assert submessage_opener(first, keys, ENCRYPTED, bytes(4)) is None
-
-
-def test_there_is_none_for_what_is_signed() -> None:
-    of = material(TransformationKind.AES256_GMAC)
-    keys, signed = ring(of), sealed(submessage(24), sending_key(of))
-    assert open_submessage(signed, keys, Protection(encrypted=False)) == submessage(24)
-    assert submessage_opener(signed, keys, Protection(encrypted=False), bytes(4)) is None
+    assert submessage_opener(first, keys, ENCRYPTED, NOBODY) is None
 
 
 # --- messages --------------------------------------------------------------------------------------------------------
 
-SIGNED = Protection(encrypted=False)
-KINDS = {ENCRYPTED: TransformationKind.AES256_GCM, SIGNED: TransformationKind.AES256_GMAC}
-EITHER = pytest.mark.parametrize("expected", [ENCRYPTED, SIGNED], ids=["encrypted", "signed"])
 HEADER = b"RTPS\2\5\1\xdd" + bytes(range(12))
 
 
@@ -185,8 +208,7 @@ def sealed_message(size: int, key: SendingKey, header: bytes = HEADER) -> bytes:
 
 
 def message_keys(expected: Protection) -> tuple[KeyRing, SendingKey, MessageOpener | SignedMessageOpener]:
-    of = material(KINDS[expected])
-    keys, key = ring(of), sending_key(of)
+    keys, key = keys_for(expected)
     first = sealed_message(24, key)
     assert open_message(first, keys, expected) == HEADER + submessage(24)
     opener = message_opener(first, keys, expected)
