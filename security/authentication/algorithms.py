@@ -42,7 +42,8 @@ class SignatureAlgorithm:
     key: str
 
 
-RSA_2048: Final = SignatureAlgorithm("RSA-2048", "RSASSA-PSS-SHA256", "RSASSA-PSS-MGF1SHA256+2048+SHA256", "RSA 2048")
+# Longer RSA keys go by these names too, as they do in Fast DDS.
+RSA_2048: Final = SignatureAlgorithm("RSA-2048", "RSASSA-PSS-SHA256", "RSASSA-PSS-MGF1SHA256+2048+SHA256", "RSA")
 EC_P256: Final = SignatureAlgorithm("EC-prime256v1", "ECDSA-SHA256", "ECDSA+P256+SHA256", "EC P-256")
 # Only 1.2 has it, so it has no other name.
 EC_P384: Final = SignatureAlgorithm("ECDSA+P384+SHA384", "ECDSA+P384+SHA384", "ECDSA+P384+SHA384", "EC P-384")

@@ -1,6 +1,6 @@
 """Certificate: an X.509 certificate, read once and for all, and what of it the handshake needs.
 
-RFC 5280; DDS-Security 1.1 §9.3.1.2 (identity certificates: RSA 2048 or EC P-256; 1.2 adds P-384).  Those of peers are
+RFC 5280; DDS-Security 1.1 §9.3.1.2 (identity certificates: RSA or EC P-256; 1.2 adds P-384).  Those of peers are
 hostile: reading one raises NotTrusted and nothing else.  Whether it is to be believed, ``trust_anchors`` decides.
 """
 
@@ -14,7 +14,7 @@ from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
-from cryptography.x509.oid import ExtensionOID, ObjectIdentifier, SignatureAlgorithmOID
+from cryptography.x509.oid import ExtensionOID, ObjectIdentifier
 
 from ddsi.structure.dataclass import dataclass
 
@@ -46,11 +46,7 @@ _EXTENSIONS: Final = {
     ExtensionOID.CERTIFICATE_POLICIES,
 }
 # Collisions in these are made at will, so what they sign may be another's.
-_BROKEN: Final = {
-    SignatureAlgorithmOID.RSA_WITH_MD5: "MD5",
-    SignatureAlgorithmOID.RSA_WITH_SHA1: "SHA-1",
-    SignatureAlgorithmOID.ECDSA_WITH_SHA1: "SHA-1",
-}
+_BROKEN: Final = {"md5": "MD5", "sha1": "SHA-1"}
 _NANOSECONDS: Final = 1_000_000_000
 
 
@@ -94,8 +90,9 @@ class Certificate:
         key = certificate.public_key()
         algorithm = algorithm_of_key(key)
         assert isinstance(key, rsa.RSAPublicKey | ec.EllipticCurvePublicKey)  # it let no other pass
-        if certificate.signature_algorithm_oid in _BROKEN:
-            raise NotTrusted(f"it was signed with {_BROKEN[certificate.signature_algorithm_oid]}, which is broken")
+        digest = certificate.signature_hash_algorithm
+        if digest is not None and digest.name in _BROKEN:
+            raise NotTrusted(f"it was signed with {_BROKEN[digest.name]}, which is broken")
         for extension in certificate.extensions:
             if extension.critical and extension.oid not in _EXTENSIONS:
                 raise NotTrusted(f"its extension {extension.oid.dotted_string} is critical and not supported")

@@ -3,6 +3,9 @@
 DDS-Security 1.1 §9.3.2.5.2, table 51: ECDSA with SHA-256, or RSASSA-PSS with SHA-256 and MGF1 of SHA-256; 1.2 adds
 ECDSA over P-384 with SHA-384.  Fast DDS signs with a PSS salt of 32 octets, Cyclone DDS and OpenDDS with the longest
 possible; each verifies any, and so do we.
+
+The specification names RSA of 2048 bits alone.  Authorities often have longer keys, and Fast DDS takes those under the
+same names, so we do; Cyclone DDS refuses them.
 """
 
 from __future__ import annotations
@@ -21,7 +24,9 @@ __all__ = ["PSS_SALT_OCTETS", "PrivateKey", "PublicKey", "SoftwareKey", "algorit
 PublicKey = rsa.RSAPublicKey | ec.EllipticCurvePublicKey
 
 PSS_SALT_OCTETS: Final = 32
-_RSA_BITS: Final = 2048
+_LEAST_RSA_BITS: Final = 2048
+_MOST_RSA_BITS: Final = 4096
+"""Longer ones cost more than a stranger may ask for."""
 _CURVES: Final = {"secp256r1": EC_P256, "secp384r1": EC_P384}
 _SIGNING_PSS: Final = padding.PSS(padding.MGF1(hashes.SHA256()), PSS_SALT_OCTETS)
 _ANY_PSS: Final = padding.PSS(padding.MGF1(hashes.SHA256()), padding.PSS.AUTO)
@@ -68,9 +73,9 @@ class SoftwareKey:
 
 
 def algorithm_of_key(key: object) -> SignatureAlgorithm:
-    """Raises NotTrusted, naming what the key is, for all but RSA 2048, EC P-256 and EC P-384."""
+    """Raises NotTrusted, naming what the key is, for all but RSA of 2048 to 4096 bits, EC P-256 and EC P-384."""
     match key:
-        case rsa.RSAPublicKey() if key.key_size == _RSA_BITS:
+        case rsa.RSAPublicKey() if _LEAST_RSA_BITS <= key.key_size <= _MOST_RSA_BITS:
             return RSA_2048
         case ec.EllipticCurvePublicKey() if key.curve.name in _CURVES:
             return _CURVES[key.curve.name]
@@ -80,7 +85,7 @@ def algorithm_of_key(key: object) -> SignatureAlgorithm:
             found = f"EC {key.curve.name}"
         case _:
             found = type(key).__name__.removesuffix("PublicKey") or "unknown"
-    raise NotTrusted(f"its key is {found}, and only RSA 2048, EC P-256 and EC P-384 are supported")
+    raise NotTrusted(f"its key is {found}, and only RSA of 2048 to 4096 bits, EC P-256 and EC P-384 are supported")
 
 
 def verify(key: PublicKey, signature: bytes, content: bytes) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import datetime
+import subprocess
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -18,9 +20,11 @@ from ddsi_security.authentication.certificate import Certificate, pem_blocks
 from ddsi_security.authentication.identity_material import IdentityMaterial, read_identity_material
 from ddsi_security.authentication.not_trusted import NotTrusted
 from ddsi_security.authentication.private_key import read_private_key
+from ddsi_security.authentication.signatures import verify
 
 from .material import (
     DAY_S,
+    KEYSTORE_RSA,
     NOW_S,
     SECOND,
     Issued,
@@ -67,6 +71,14 @@ def test_identities_and_authorities_of_each_kind(kind: str, algorithm: object, c
     assert material.certificate.algorithm is algorithm
     assert material.authority.algorithm is (RSA_2048 if ca == "RSA" else EC_P256)
     assert material.certificate.subject == "CN=alice,O=Peers"
+
+
+def test_an_rsa_key_of_3072_bits_is_called_and_signs_as_one_of_2048() -> None:
+    key = rsa.generate_private_key(65537, 3072)
+    ca = issue("CN=ca", key)
+    material = read(properties(issue("CN=alice", key, ca), ca))
+    assert material.certificate.algorithm is material.authority.algorithm is RSA_2048
+    verify(material.certificate.public_key, material.key.sign(b"content"), b"content")
 
 
 def test_files_with_text_and_several_authorities(tmp_path: Path) -> None:
@@ -217,7 +229,7 @@ def test_other_keys_are_refused_by_their_name(make: Callable[[], ec.EllipticCurv
         .not_valid_after(at(NOW_S + 1))
     )
     certificate = builder.sign(authority().key, hashes.SHA256())
-    with pytest.raises(NotTrusted, match=f"its key is {name}, and only RSA 2048, EC P-256 and EC P-384"):
+    with pytest.raises(NotTrusted, match=f"its key is {name}, and only RSA of 2048 to 4096 bits"):
         Certificate.from_pem(certificate.public_bytes(serialization.Encoding.PEM))
     with pytest.raises(NotTrusted, match=f"its key is {name}"):
         read_private_key(
@@ -256,6 +268,25 @@ def test_certificates_that_broken_hashes_hold_together(octet: bytes, name: str) 
     assert der.count(rsa_with + b"\x0b") == 2
     with pytest.raises(NotTrusted, match=f"signed with {name}, which is broken"):
         Certificate.from_der(der.replace(rsa_with + b"\x0b", rsa_with + octet))
+
+
+@pytest.mark.parametrize(("digest", "is_broken"), [("sha1", True), ("sha256", False)])
+def test_a_broken_hash_is_found_in_the_parameters_of_pss(digest: str, is_broken: bool) -> None:
+    """There the algorithm's name does not tell it.  The library makes no such certificate any more, openssl does."""
+    command = [
+        "openssl",
+        "req",
+        "-x509",
+        "-new",
+        "-key",
+        str(KEYSTORE_RSA / "carol.key"),
+        f"-{digest}",
+        "-subj",
+        "/CN=ca",
+    ]
+    pem = subprocess.run([*command, "-sigopt", "rsa_padding_mode:pss"], check=True, capture_output=True).stdout
+    with pytest.raises(NotTrusted, match="signed with SHA-1, which is broken") if is_broken else nullcontext():
+        assert Certificate.from_pem(pem).algorithm is RSA_2048
 
 
 def identity_with(**changes: object) -> Issued:
