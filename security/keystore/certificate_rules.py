@@ -1,4 +1,4 @@
-"""Rules on certificates and keys.  DDS-Security 1.1 §9.3.1, §9.3.2.1; what vendors accept."""
+"""Rules on certificates and keys, but for their algorithms.  DDS-Security 1.1 §9.3.1, §9.3.2.1; what vendors accept."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Final
 
 from cryptography import x509
-from cryptography.exceptions import UnsupportedAlgorithm
-from cryptography.hazmat.primitives.asymmetric import ec, rsa
 
+from .algorithm_rules import check_identity_ca_key, check_identity_key, check_permissions_ca_key, check_signature
 from .certificate import certificate_validity, is_authority, is_issued_by, may_sign_documents
 from .distinguished_name import rfc2253_text
 from .finding import Finding, Rule, Severity
 from .horizon import Horizon
-from .key_pair import PrivateKey, algorithm_text
+from .key_pair import PrivateKey
 
 __all__ = [
     "CERTIFICATE_UNREADABLE",
@@ -37,9 +36,6 @@ EXPIRED: Final = Rule("certificate-expired", Severity.ERROR, "a certificate is n
 NOT_YET_VALID: Final = Rule("certificate-not-yet-valid", Severity.ERROR, "a certificate is not valid yet")
 EXPIRES_SOON: Final = Rule("certificate-expires-soon", Severity.WARNING, "a certificate ends within --soon days")
 WRONG_CA: Final = Rule("identity-wrong-ca", Severity.ERROR, "the identity CA did not issue the identity's certificate")
-WEAK_ALGORITHM: Final = Rule("weak-algorithm", Severity.ERROR, "a key or a signature that can be forged")
-UNSUPPORTED_KEY: Final = Rule("unsupported-key", Severity.ERROR, "a key of a kind that DDS Security does not know")
-P384_KEY: Final = Rule("p384-key", Severity.WARNING, "EC P-384, which came with DDS Security 1.2")
 NOT_AUTHORITY: Final = Rule("ca-not-authority", Severity.WARNING, "a CA's certificate does not say that it is one")
 INTERMEDIATE: Final = Rule("ca-intermediate", Severity.WARNING, "another authority issued the identity CA")
 MAY_NOT_SIGN: Final = Rule("ca-may-not-sign", Severity.WARNING, "the permissions CA's key is not for documents")
@@ -48,12 +44,8 @@ SHARED_AUTHORITY: Final = Rule("shared-ca", Severity.NOTE, "one authority issues
 SUBJECT_REPEATS: Final = Rule("subject-repeats", Severity.WARNING, "a subject with two values of one kind")
 RULES: Final = (
     *(CERTIFICATE_UNREADABLE, KEY_UNREADABLE, KEY_HAS_PASSWORD, KEY_MISMATCH, EXPIRED, NOT_YET_VALID, EXPIRES_SOON),
-    *(WRONG_CA, WEAK_ALGORITHM, UNSUPPORTED_KEY, P384_KEY, NOT_AUTHORITY, INTERMEDIATE, MAY_NOT_SIGN),
-    *(IDENTITY_IS_AUTHORITY, SHARED_AUTHORITY, SUBJECT_REPEATS),
+    *(WRONG_CA, NOT_AUTHORITY, INTERMEDIATE, MAY_NOT_SIGN, IDENTITY_IS_AUTHORITY, SHARED_AUTHORITY, SUBJECT_REPEATS),
 )
-
-_LEAST_RSA_BITS: Final = 2048
-_WEAK_DIGESTS: Final = ("md5", "sha1")
 
 Certified = tuple[Path, x509.Certificate]
 """A certificate, and the file it is in."""
@@ -63,6 +55,7 @@ def check_identity(identity: Certified, authority: Certified | None, horizon: Ho
     """A certificate by which a participant is known."""
     path, certificate = identity
     yield from _check_certificate(identity, "the identity's certificate", horizon)
+    yield from check_identity_key(path, certificate)
     if authority and not is_issued_by(certificate, authority[1]):
         issuer, ca = rfc2253_text(certificate.issuer), rfc2253_text(authority[1].subject)
         text = f"it was issued by {issuer}, and the identity CA in {authority[0]} is {ca}"
@@ -97,6 +90,7 @@ def check_authority(authority: Certified, what: str, horizon: Horizon) -> Iterat
 def check_identity_issuer(authority: Certified) -> Iterator[Finding]:
     """The certificate of the identity CA, beyond what is asked of every authority."""
     path, certificate = authority
+    yield from check_identity_ca_key(path, certificate)
     if certificate.issuer != certificate.subject:
         yield INTERMEDIATE.at(
             path,
@@ -109,6 +103,7 @@ def check_identity_issuer(authority: Certified) -> Iterator[Finding]:
 def check_document_signer(authority: Certified) -> Iterator[Finding]:
     """The certificate of the permissions CA, beyond what is asked of every authority."""
     path, certificate = authority
+    yield from check_permissions_ca_key(path, certificate)
     if not may_sign_documents(certificate):
         yield MAY_NOT_SIGN.at(
             path,
@@ -161,34 +156,7 @@ def _check_certificate(one: Certified, what: str, horizon: Horizon) -> Iterator[
             f"{what} is not valid before {validity.not_before:%Y-%m-%d %H:%M:%SZ}",
             remedy="set this machine's clock, or issue it anew",
         )
-    yield from _check_algorithms(path, certificate, what)
-
-
-def _check_algorithms(path: Path, certificate: x509.Certificate, what: str) -> Iterator[Finding]:
-    key = certificate.public_key()
-    kind = algorithm_text(key)
-    remedy = "make it anew with EC P-256, which every vendor takes, or RSA of 2048 bits"
-    if isinstance(key, rsa.RSAPublicKey) and key.key_size < _LEAST_RSA_BITS:
-        yield WEAK_ALGORITHM.at(path, f"{what} has a key of {kind}, which can be broken", remedy=remedy)
-    elif isinstance(key, ec.EllipticCurvePublicKey) and kind == "EC P-384":
-        text = (
-            f"{what} has a key of EC P-384: Cyclone DDS 0.10 and Fast DDS 2.9, which know DDS Security 1.1, refuse it"
-        )
-        yield P384_KEY.at(path, text, remedy="use EC P-256 where they take part")
-    elif kind not in ("EC P-256", "RSA 2048"):
-        text = f"{what} has a key of {kind}; DDS Security knows RSA 2048 and EC P-256"
-        yield UNSUPPORTED_KEY.at(path, text, remedy=remedy)
-    digest = _digest_name(certificate)
-    if digest in _WEAK_DIGESTS:
-        yield WEAK_ALGORITHM.at(path, f"{what} is signed with {digest.upper()}, which can be forged", remedy=remedy)
-
-
-def _digest_name(certificate: x509.Certificate) -> str:
-    try:
-        algorithm = certificate.signature_hash_algorithm
-    except UnsupportedAlgorithm:
-        return ""
-    return algorithm.name if algorithm else ""
+    yield from check_signature(path, certificate, what)
 
 
 def _check_subject(path: Path, subject: x509.Name) -> Iterator[Finding]:

@@ -12,7 +12,15 @@ from typing import Final
 
 from ddsi.structure.errors import ConfigurationError
 
-from . import agreement_rules, certificate_rules, document_rules, file_rules, governance_rules, permissions_rules
+from . import (
+    agreement_rules,
+    algorithm_rules,
+    certificate_rules,
+    document_rules,
+    file_rules,
+    governance_rules,
+    permissions_rules,
+)
 from .agreement_rules import check_documents, check_subject
 from .certificate import parse_certificate
 from .certificate_rules import (
@@ -45,6 +53,7 @@ RULES: Final[dict[str, Rule]] = {
     for module in (
         file_rules,
         certificate_rules,
+        algorithm_rules,
         document_rules,
         governance_rules,
         permissions_rules,

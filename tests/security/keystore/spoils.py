@@ -17,8 +17,9 @@ from ddsi_security.keystore.key_pair import Algorithm, generate_key, private_key
 
 from .keystores import ALICE, Workshop
 
-__all__ = ["SPOILS", "Spoil", "add_rule", "section"]
+__all__ = ["PERMISSIONS_CA", "SPOILS", "Spoil", "add_rule", "certificate", "section"]
 
+IDENTITY_CA, PERMISSIONS_CA = "CN=Identity CA,O=Example", "CN=Permissions CA,O=Example"
 KINDS = ("discovery_protection_kind", "liveliness_protection_kind", "rtps_protection_kind")
 ALL_NONE = [
     ("ENCRYPT</", "NONE</"),
@@ -41,8 +42,12 @@ def certificate(
     ca: bool | None,
     issuer: Authority | None = None,
     usage: x509.KeyUsage | x509.ExtendedKeyUsage | None = None,
+    digest: hashes.SHA256 | hashes.SHA384 | hashes.SHA512 | None = None,
 ) -> x509.Certificate:
-    """One from the workshop's identity CA, or another ``issuer``; ``ca`` None: without basicConstraints."""
+    """One from the workshop's identity CA, or another ``issuer``; ``ca`` None: without basicConstraints.
+
+    It is signed with SHA-256, or another ``digest``.
+    """
     issuer = issuer or workshop.identity_ca
     builder = (
         x509.CertificateBuilder()
@@ -57,7 +62,7 @@ def certificate(
         builder = builder.add_extension(x509.BasicConstraints(ca=ca, path_length=None), critical=True)
     if usage is not None:
         builder = builder.add_extension(usage, critical=True)
-    return builder.sign(issuer.private_key, hashes.SHA256())
+    return builder.sign(issuer.private_key, digest or hashes.SHA256())
 
 
 # --- how to spoil a keystore ---------------------------------------------------------------------------------
@@ -195,17 +200,53 @@ def _(workshop: Workshop) -> None:
     workshop.identity = Identity(certificate(workshop, ALICE, key, ca=False), key)
 
 
+@spoils("p384-key", "identity_ca.cert.pem")
+def _(workshop: Workshop) -> None:
+    """Signed with SHA-256, so that nothing but the key is unusual."""
+    own, key = workshop.authority("Identity CA", Algorithm.EC_P384), workshop.identity.private_key
+    made = certificate(workshop, IDENTITY_CA, own.private_key, ca=True, issuer=own)
+    workshop.identity_ca = Authority(made, own.private_key)
+    workshop.identity = Identity(certificate(workshop, ALICE, key, ca=False), key)
+
+
+@spoils("rsa-key", "cert.pem")
+def _(workshop: Workshop) -> None:
+    key = rsa.generate_private_key(public_exponent=65537, key_size=3072)
+    workshop.identity = Identity(certificate(workshop, ALICE, key, ca=False), key)
+
+
+@spoils("certificate-signature", "cert.pem")
+def _(workshop: Workshop) -> None:
+    key = workshop.identity.private_key
+    workshop.identity = Identity(certificate(workshop, ALICE, key, ca=False, digest=hashes.SHA384()), key)
+
+
+@spoils("certificate-signature", "identity_ca.cert.pem")
+def _(workshop: Workshop) -> None:
+    """An authority's own signature, though nobody needs it to believe the authority."""
+    key = workshop.identity_ca.private_key
+    made = certificate(workshop, IDENTITY_CA, key, ca=True, digest=hashes.SHA512())
+    workshop.identity_ca = Authority(made, key)
+
+
+@spoils("certificate-signature", "permissions_ca.cert.pem")
+def _(workshop: Workshop) -> None:
+    own, key = workshop.permissions_ca, workshop.permissions_ca.private_key
+    made = certificate(workshop, PERMISSIONS_CA, key, ca=True, issuer=own, digest=hashes.SHA384())
+    workshop.permissions_ca = workshop.document_signer = Authority(made, key)
+
+
 @spoils("ca-not-authority", "identity_ca.cert.pem")
 def _(workshop: Workshop) -> None:
     key = workshop.identity_ca.private_key
-    workshop.identity_ca = Authority(certificate(workshop, "CN=Identity CA,O=Example", key, ca=None), key)
+    workshop.identity_ca = Authority(certificate(workshop, IDENTITY_CA, key, ca=None), key)
 
 
 @spoils("ca-intermediate", "identity_ca.cert.pem")
 def _(workshop: Workshop) -> None:
     root = Authority.create(parse_name("/O=Example/CN=Root"), Algorithm.EC, workshop.validity)
     key = workshop.identity_ca.private_key
-    workshop.identity_ca = Authority(certificate(workshop, "CN=Identity CA,O=Example", key, ca=True, issuer=root), key)
+    workshop.identity_ca = Authority(certificate(workshop, IDENTITY_CA, key, ca=True, issuer=root), key)
 
 
 for usage in (CERTIFICATES_ALONE, x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])):
@@ -213,7 +254,7 @@ for usage in (CERTIFICATES_ALONE, x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SER
     @spoils("ca-may-not-sign", "permissions_ca.cert.pem")
     def _(workshop: Workshop, usage: x509.KeyUsage | x509.ExtendedKeyUsage = usage) -> None:
         own, key = workshop.permissions_ca, workshop.permissions_ca.private_key
-        made = certificate(workshop, "CN=Permissions CA,O=Example", key, ca=True, issuer=own, usage=usage)
+        made = certificate(workshop, PERMISSIONS_CA, key, ca=True, issuer=own, usage=usage)
         workshop.permissions_ca = workshop.document_signer = Authority(made, key)
 
 

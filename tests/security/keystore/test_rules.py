@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+from ddsi_security.keystore.algorithm_rules import (
+    check_identity_ca_key,
+    check_identity_key,
+    check_permissions_ca_key,
+    check_signature,
+)
+from ddsi_security.keystore.authority import Authority
+from ddsi_security.keystore.certificate import parse_certificate
 from ddsi_security.keystore.finding import Finding
 from ddsi_security.keystore.horizon import Horizon
 from ddsi_security.keystore.key_pair import Algorithm
 from ddsi_security.keystore.linter import RULES, check_keystore
 
-from .keystores import ALICE, NOW, Workshop
-from .spoils import SPOILS, Spoil, add_rule, section
+from .keystores import ALICE, NOW, Workshop, openssl
+from .spoils import PERMISSIONS_CA, SPOILS, Spoil, add_rule, certificate, section
 
 
 def check(folder: Path, *, soon_days: int = 30) -> list[Finding]:
@@ -98,6 +107,14 @@ def documents_signed_with_rsa(workshop: Workshop) -> None:
 
 
 @near_miss
+def documents_signed_with_p384(workshop: Workshop) -> None:
+    """Vendors take any key of the permissions CA, as long as its certificate is signed with SHA-256."""
+    own = workshop.authority("Permissions CA", Algorithm.EC_P384)
+    made = certificate(workshop, PERMISSIONS_CA, own.private_key, ca=True, issuer=own)
+    workshop.permissions_ca = workshop.document_signer = Authority(made, own.private_key)
+
+
+@near_miss
 def a_certificate_for_thirty_days(workshop: Workshop) -> None:
     workshop.identity = workshop.make_identity(ALICE, workshop.days(-1, 30))
 
@@ -155,6 +172,35 @@ def test_what_only_looks_like_it_is_not_found(tmp_path: Path, near_miss: Spoil) 
     workshop = Workshop(tmp_path / "alice")
     near_miss(workshop)
     assert [str(finding) for finding in check(workshop.write())] == []
+
+
+@pytest.mark.parametrize(
+    ("key", "of_identity", "of_permissions_ca", "of_signature"),
+    [
+        (["rsa:2048", "-sha256"], None, None, None),
+        (["rsa:2048", "-sha384"], None, None, "certificate-signature"),
+        (["rsa:2048", "-sha256", "-sigopt", "rsa_padding_mode:pss"], None, None, "certificate-signature"),
+        (["rsa-pss", "-pkeyopt", "rsa_keygen_bits:2048"], "rsa-key", None, "certificate-signature"),
+        (["rsa:1024", "-sha1"], "weak-algorithm", "weak-algorithm", "weak-algorithm"),
+        (["ec", "-pkeyopt", "ec_paramgen_curve:P-521", "-sha256"], "unsupported-key", None, None),
+        (["ed25519"], "unsupported-key", "unsupported-key", "certificate-signature"),
+    ],
+)  # fmt: skip
+def test_algorithms_by_openssl(
+    key: list[str], of_identity: str | None, of_permissions_ca: str | None, of_signature: str | None
+) -> None:
+    made = ["-newkey", *key, "-nodes", "-keyout", os.devnull, "-subj", "/CN=alice"]
+    path, read = Path("cert.pem"), parse_certificate(openssl("req", "-x509", *made).encode(), "cert.pem")
+    for findings, rule in (
+        (check_identity_key(path, read), of_identity),
+        (check_identity_ca_key(path, read), of_identity),
+        (check_permissions_ca_key(path, read), of_permissions_ca),
+        (check_signature(path, read, "the certificate"), of_signature),
+    ):
+        found = list(findings)
+        assert [finding.rule.id for finding in found] == [rule] * (rule is not None)
+        for finding in found:
+            assert_reads_well(finding)
 
 
 @pytest.mark.parametrize(
