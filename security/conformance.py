@@ -7,9 +7,9 @@ a peer comes.  Looks at names and parameters, not at types; conventions: :mod:`d
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-__all__ = ["objections"]
+__all__ = ["bypassed", "objections"]
 
 _BY_POSITION_OR_NAME = inspect.Parameter.POSITIONAL_OR_KEYWORD
 _VARIABLE = {inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD}
@@ -30,6 +30,25 @@ def objections(plugin: object, interface: type) -> list[str]:
         if name not in missing
         for objection in _objections_to_operation(getattr(plugin, name), function)
     ]
+
+
+def bypassed(plugin: object, short_ways: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """What is overridden in ``plugin`` and yet never called, since a short way that it inherits goes past it.
+
+    ``short_ways``: which operations each of them stands for.  A clause each, as of :func:`objections`.
+    """
+    classes = type(plugin).__mro__
+    return [
+        f"{operation} is overridden, but {short_way}, which it inherits, goes past it: override that too"
+        for short_way, operations in short_ways.items()
+        for operation in operations
+        if _depth(operation, classes) < _depth(short_way, classes) < len(classes)
+    ]
+
+
+def _depth(name: str, classes: tuple[type, ...]) -> int:
+    """Which of the classes is the first to define it; their number if none does."""
+    return next((depth for depth, one in enumerate(classes) if name in vars(one)), len(classes))
 
 
 def _objections_to_operation(given: object, function: object) -> Iterator[str]:

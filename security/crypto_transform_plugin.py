@@ -7,14 +7,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 from ddsi.spi import Octets, Outcome, Overhead, Parts, Refused
 from ddsi.structure.dataclass import dataclass
 
 from .handles import DatareaderCryptoHandle, DatawriterCryptoHandle, ParticipantCryptoHandle
 
-__all__ = ["CryptoTransform", "OpensAlike", "SealsAlike", "SecureSubmessage", "SecureSubmessageCategory"]
+__all__ = [
+    "SHORT_WAYS",
+    "CryptoTransform",
+    "OpensAlike",
+    "SealsAlike",
+    "SecureSubmessage",
+    "SecureSubmessageCategory",
+]
+
+SHORT_WAYS: Final = {
+    "message_sealer": ("encode_rtps_message",),
+    "submessage_sealer": ("encode_datawriter_submessage", "encode_datareader_submessage"),
+    "payload_sealer": ("encode_serialized_payload",),
+    "message_opener": ("decode_rtps_message",),
+    "submessage_opener": ("preprocess_secure_submsg", "decode_datawriter_submessage", "decode_datareader_submessage"),
+    "payload_opener": ("decode_serialized_payload",),
+}
+"""What :class:`SealsAlike` and :class:`OpensAlike` offer, and which operations of the OMG's each stands for.
+
+Who extends a plugin that has them and overrides such an operation overrides its short way too; to return None is
+enough.
+"""
 
 
 class SecureSubmessageCategory(Enum):
@@ -66,7 +87,12 @@ class CryptoTransform(Protocol):
         plain_buffer: Octets,
         sending_datawriter_crypto: DatawriterCryptoHandle,
     ) -> Parts | Refused:
-        """§8.5.1.9.1.  A whole SerializedPayload, or one run of its fragments."""
+        """§8.5.1.9.1.  A whole SerializedPayload, or one run of its fragments.
+
+        ``extra_inline_qos`` is empty and must stay so.  The OMG lets a plugin add parameters there that tell the reader
+        how to decode; the builtin plugin has none (§9.5.3.3), and here nobody would carry them.  They belong in the
+        payload.
+        """
         ...
 
     def encode_datawriter_submessage(
@@ -139,7 +165,7 @@ class CryptoTransform(Protocol):
         receiving_datareader_crypto: DatareaderCryptoHandle,
         sending_datawriter_crypto: DatawriterCryptoHandle,
     ) -> Octets | Outcome:
-        """§8.5.1.9.9.  A whole payload, or one run of fragments, as it was encoded."""
+        """§8.5.1.9.9.  A whole payload, or one run of fragments, as it was encoded.  ``inline_qos`` is always empty."""
         ...
 
 

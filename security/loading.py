@@ -21,7 +21,8 @@ from ddsi.structure.dataclass import dataclass
 from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.qos_policies import Properties
 
-from .conformance import objections
+from .conformance import bypassed, objections
+from .crypto_transform_plugin import SHORT_WAYS
 from .data_tagging import QosDataTagging
 from .plugins import (
     PLUGIN_VERSION,
@@ -99,7 +100,8 @@ def load_plugins(properties: Properties, *, entropy: Callable[[int], bytes], wal
 
     ``entropy(n)`` gives n octets, ``wall_clock()`` nanoseconds since 1970.  Raises ConfigurationError, naming property
     and value, for a plugin that is not there, cannot be imported, is made for another :data:`PLUGIN_VERSION`, fails to
-    start, or lacks operations of its interface; and for a ``dds.sec.*`` property that nobody knows.
+    start, lacks operations of its interface, or overrides some that are never called; and for a ``dds.sec.*`` property
+    that nobody knows.
     """
     chosen = security_properties(properties)
     authentication, access_control, cryptographic, logging = (
@@ -145,6 +147,8 @@ class _Choice:
         if found := objections(plugin, self._kind.interface):
             made = f"the {type(plugin).__name__} it makes is no {self._kind.interface.__name__}"
             raise self._refused(f"{made}: {'; '.join(found)}")
+        if found := bypassed(plugin, SHORT_WAYS):
+            raise self._refused(f"of the {type(plugin).__name__} it makes, {'; '.join(found)}")
         return plugin
 
     def _check_version(self, bearer: object, *, is_due: bool) -> None:

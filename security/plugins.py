@@ -3,7 +3,8 @@
 DDS-Security 1.1 §8.3 (Authentication), §8.4 (AccessControl), §8.5 (Cryptographic), §8.6 (Logging), §8.7 (DataTagging).
 Operations bear the OMG's names in snake case.  What differs from its IDL, everywhere alike:
 
-* what the OMG returns through ``inout`` parameters is returned; only encoders append to the caller's buffer;
+* what the OMG returns through ``inout`` parameters is returned; the one that is left, ``extra_inline_qos``, must stay
+  empty: see :meth:`CryptoTransform.encode_serialized_payload`;
 * there is no ``SecurityException`` parameter: a local mistake is raised (ConfigurationError, NotAllowedBySecurity), and
   whatever a peer can bring about is a value - :class:`Refused`, or a decode outcome - because a peer's fault is no
   exception;

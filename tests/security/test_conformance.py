@@ -6,7 +6,13 @@ from typing import Any, Protocol
 
 import pytest
 
-from ddsi_security.conformance import objections
+from ddsi.spi import Octets, Parts, Refused
+from ddsi.structure.errors import ConfigurationError
+from ddsi_security.conformance import bypassed, objections
+from ddsi_security.crypto_transform_plugin import SHORT_WAYS, CryptoTransform, OpensAlike, SealsAlike
+from ddsi_security.cryptographic import AesGcmGmac
+from ddsi_security.handles import DatawriterCryptoHandle
+from ddsi_security.loading import load_plugins
 
 
 class Interface(Protocol):
@@ -100,3 +106,81 @@ def test_plugins_are_not_async() -> None:
             return 0
 
     assert objections(Waiting(), Interface) == ["open is async: return Pending(job) for slow work"]
+
+
+# --- short ways ------------------------------------------------------------------------------------------
+
+
+class Whole:
+    def seal(self) -> int:
+        return 1
+
+    def sealer(self) -> int:
+        return 2
+
+
+class Overriding(Whole):
+    def seal(self) -> int:
+        return 3
+
+
+class OverridingBoth(Overriding):
+    def sealer(self) -> int:
+        return 4
+
+
+class AboveBoth(OverridingBoth):
+    def another(self) -> None: ...
+
+
+class WithoutShortWay:
+    def seal(self) -> int:
+        return 5
+
+
+@pytest.mark.parametrize(
+    ("plugin", "is_bypassed"),
+    [(Whole(), False), (Overriding(), True), (OverridingBoth(), False), (AboveBoth(), False),
+     (WithoutShortWay(), False), (Delegating(), False)],
+)  # fmt: skip
+def test_an_operation_that_an_inherited_short_way_goes_past(plugin: object, is_bypassed: bool) -> None:
+    found = bypassed(plugin, {"sealer": ("open", "seal")})
+    assert found == ["seal is overridden, but sealer, which it inherits, goes past it: override that too"] * is_bypassed
+
+
+class Counting(AesGcmGmac):
+    """Extends the builtin plugin, as is easily done."""
+
+    def encode_serialized_payload(
+        self, extra_inline_qos: bytearray, plain_buffer: Octets, sending_datawriter_crypto: DatawriterCryptoHandle
+    ) -> Parts | Refused:
+        return super().encode_serialized_payload(extra_inline_qos, plain_buffer, sending_datawriter_crypto)
+
+
+class CountingAll(Counting):
+    def payload_sealer(self, sending_datawriter_crypto: DatawriterCryptoHandle) -> None:
+        return None
+
+
+def cryptographic(name: str) -> object:
+    chosen = {"dds.sec.crypto.plugin": f"{__name__}:{name}"}
+    return load_plugins(chosen, entropy=bytes, wall_clock=int).cryptographic
+
+
+def test_who_extends_the_builtin_cryptography_is_told_what_would_never_be_called() -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        cryptographic("Counting")
+    assert str(refused.value).endswith(
+        ":Counting': of the Counting it makes, encode_serialized_payload is overridden, but payload_sealer, which it "
+        "inherits, goes past it: override that too"
+    )
+    assert isinstance(cryptographic("CountingAll"), CountingAll)
+
+
+def test_short_ways_are_those_that_can_be_offered_and_stand_for_all_that_transforms() -> None:
+    offered = {name for interface in (SealsAlike, OpensAlike) for name in vars(interface) if not name.startswith("_")}
+    assert set(SHORT_WAYS) == offered
+    operations = [operation for operations in SHORT_WAYS.values() for operation in operations]
+    assert sorted(operations) == sorted(
+        name for name in vars(CryptoTransform) if name.startswith(("encode_", "decode_", "preprocess_"))
+    )
