@@ -8,6 +8,9 @@ import tomllib
 from dataclasses import fields
 from pathlib import Path
 
+import pytest
+
+from ddsi.config.environment import load_config
 from ddsi.structure.guid import Guid
 from ddsi.structure.qos_policies import Properties
 from ddsi.structure.security_information import EndpointSecurity, ParticipantSecurity
@@ -108,6 +111,12 @@ def test_the_line_of_the_log_is_what_is_written(tmp_path: Path) -> None:
         plugin_method="process_handshake",
     )
     assert f"    {path.read_text()}" in TEXT
+
+
+def test_the_xml_says_what_the_properties_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DDSI_URI", code("xml"))
+    given = re.findall(r'"(dds\.sec\.[\w.]+)": f"\{enclave\}(/[\w.]+)"', code("python"))
+    assert dict(load_config(0).security) == {name: f"file:keystore/enclaves/alice{path}" for name, path in given}
 
 
 def test_names_and_numbers_are_those_of_the_code() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
+import time
 from importlib import metadata
 from pathlib import Path
 
@@ -63,6 +64,19 @@ def test_every_subcommand_has_its_help_and_its_place_in_the_manual(shell: Shell,
     assert f"ddsi keystore {name}" in PAGE
     for option in {word.strip("[],") for word in said.split() if word.startswith("--")}:
         assert option in ("--help", "--json") or option in PAGE, f"{option} of {name} is not in the manual"
+
+
+def test_the_manual_s_commands_of_openssl_make_what_has_nothing_to_find(shell: Shell, tmp_path: Path) -> None:
+    shell.now = time.time_ns()  # openssl knows no other
+    shell.create(tmp_path / "ks")
+    commands = PAGE[PAGE.index("    for ca in identity_ca") :].partition("    ddsi keystore check .")[0]
+    made = subprocess.run(
+        ["sh", "-e"], input=commands, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert made.returncode == 0, made.stderr
+    assert "subject=CN=alice,O=Example" in made.stdout
+    assert shell.run("keystore", "check", tmp_path) == 0
+    assert shell.out == "0 errors, 0 warnings, 0 notes.\n"
 
 
 def test_every_rule_is_in_the_manual() -> None:
