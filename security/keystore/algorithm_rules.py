@@ -74,7 +74,7 @@ def check_signature(path: Path, certificate: x509.Certificate, what: str) -> Ite
         path,
         f"the signatureAlgorithm of {what} is {signed}: Fast DDS 2.9 does not start with it, as it takes SHA-256 "
         "alone, with ECDSA or PKCS #1 v1.5",
-        remedy="issue it anew where Fast DDS takes part: ddsi keystore ca or identity, or openssl x509 -req -sha256",
+        remedy="issue it anew where Fast DDS takes part: ddsi keystore ca or identity, or openssl with -sha256",
     )
 
 
