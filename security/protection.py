@@ -16,6 +16,7 @@ from ddsi.messages.raw_submessage import SubmessageKind
 from ddsi.spi import NO_OVERHEAD, NOT_FOR_US, NoKeys, Octets, Outcome, Overhead, Parts, Refused, Rejected
 from ddsi.spi import Protection as Level
 from ddsi.structure.builtin_entity_ids import SPDP_WRITER
+from ddsi.structure.errors import ConfigurationError
 from ddsi.structure.guid import Guid
 from ddsi.structure.vendor import FAST_DDS, OPENDDS, RTI, RTI_MICRO, VendorId
 
@@ -142,7 +143,13 @@ class Protection:
             return short
 
         def encode(payload: Octets) -> Octets | Refused:
-            encoded = general_way(bytearray(), payload, handle)
+            extra_inline_qos = bytearray()
+            encoded = general_way(extra_inline_qos, payload, handle)
+            if extra_inline_qos:
+                raise ConfigurationError(
+                    f"{type(self._cryptographic).__name__} adds extra_inline_qos to a payload, which nobody carries: "
+                    "what a reader needs to know must be in the payload"
+                )
             return encoded if isinstance(encoded, Refused) else b"".join(encoded)
 
         return encode

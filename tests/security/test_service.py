@@ -17,7 +17,9 @@ from ddsi.spi import (
     SPI_VERSION,
     NoKeys,
     NotForUs,
+    Octets,
     Outcome,
+    Parts,
     Refused,
     Rejected,
     SendMessage,
@@ -39,6 +41,7 @@ from ddsi_security.announced import SecurityInfo, info_parameter, token_paramete
 from ddsi_security.authentication.handshake import Handshake
 from ddsi_security.authentication.not_trusted import NotTrusted
 from ddsi_security.authentication.signatures import SoftwareKey
+from ddsi_security.cryptographic import AesGcmGmac
 from ddsi_security.cryptographic.key_material import KeyMaterial
 from ddsi_security.cryptographic.session_keys import ReceiverKey
 from ddsi_security.generic_message import (
@@ -48,7 +51,7 @@ from ddsi_security.generic_message import (
     read_generic_message,
     write_generic_message,
 )
-from ddsi_security.handles import SharedSecretHandle
+from ddsi_security.handles import DatawriterCryptoHandle, SharedSecretHandle
 from ddsi_security.local_endpoint import BUILTIN_SECURE_TOPICS
 from ddsi_security.tokens import DataHolder
 
@@ -243,6 +246,26 @@ def test_a_payload_is_opened_by_the_reader_it_is_for() -> None:
     assert b"BLUE" not in protected
     assert bob.hooks.protects_payload(alice.endpoint(USER_WRITER))
     assert bytes(bob.hooks.decode_payload(alice.endpoint(USER_WRITER), protected)) == payload  # type: ignore[arg-type]
+
+
+class AddingInlineQos(AesGcmGmac):
+    """Tells in the inline QoS how to decode, as the OMG allows."""
+
+    def payload_sealer(self, sending_datawriter_crypto: DatawriterCryptoHandle) -> None:
+        return None
+
+    def encode_serialized_payload(
+        self, extra_inline_qos: bytearray, plain_buffer: Octets, sending_datawriter_crypto: DatawriterCryptoHandle
+    ) -> Parts | Refused:
+        extra_inline_qos += bytes(4)
+        return super().encode_serialized_payload(extra_inline_qos, plain_buffer, sending_datawriter_crypto)
+
+
+def test_extra_inline_qos_is_refused_and_not_lost_in_silence() -> None:
+    alice = Side("alice", extra={"dds.sec.crypto.plugin": f"{__name__}:AddingInlineQos"})
+    alice.hooks.local_writer(writer_data(alice))
+    with pytest.raises(ConfigurationError, match="AddingInlineQos adds extra_inline_qos to a payload"):
+        alice.hooks.encode_payload(alice.endpoint(USER_WRITER), bytes(8))
 
 
 @pytest.mark.parametrize(
