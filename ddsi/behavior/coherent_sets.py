@@ -92,7 +92,7 @@ class Outlet(Protocol):
         ...
 
     def spoilt(self, part: Part, end: CacheChange | None, now: float) -> None:
-        """A part was not whole when it ended; None: its writer is gone."""
+        """A part was not whole when it ended; None: its writer is gone, or how it ended is not known."""
         ...
 
     def nothing(self, end: CacheChange, now: float) -> bool:
@@ -190,6 +190,14 @@ class CoherentSets:
             self.filtered(writer, start, numbers.base)
             for number in numbers:
                 self.filtered(writer, number, number + 1)
+
+    def passed(self, writer: Guid, next_sn: int, now: float) -> None:
+        """Below ``next_sn`` nothing more will come.  A part of which a number is missing there need not wait for what
+        ends it: that may be missing too, and the writer silent from now on."""
+        part = self._parts.get(writer)
+        if part is not None and part.next_sn < next_sn and not self._are_filtered(writer, part.next_sn, next_sn):
+            self._spoil(part, f"number {part.next_sn} of its coherent set is missing")
+            self._give_up(part, None, now)
 
     def writer_unmatched(self, writer: Guid, now: float) -> None:
         """The writer is gone: what it has begun will never be whole."""

@@ -36,6 +36,7 @@ class PublisherGroup:
         self._group_set_sn = 0
         # The number of the first change of each writer that has written in the open set.
         self._set_sns: dict[Guid, int] = {}
+        self._last_group_sns: dict[Guid, int] = {}
 
     def __repr__(self) -> str:
         is_open = f", set open since {self._group_set_sn}" if self.is_open else ""
@@ -64,7 +65,12 @@ class PublisherGroup:
         """What it wrote in an open set stays without an end, and is never seen."""
         self._writers.pop(writer, None)
         self._set_sns.pop(writer, None)
+        self._last_group_sns.pop(writer, None)
         self.writer_set = group_digest(self._writers)
+
+    def last_of(self, writer: Guid) -> int:
+        """The group number of what this writer wrote last; 0: it has written nothing."""
+        return self._last_group_sns.get(writer, 0)
 
     # --- sets --------------------------------------------------------------------------------------------
 
@@ -94,6 +100,7 @@ class PublisherGroup:
             if not presentation.coherent_access:
                 continue
             if group_set_sn and presentation.access_scope is AccessScope.GROUP:
+                self._last_group_sns[writer] = self.group_sn
                 ends[writer] = Coherence(
                     set_sns.get(writer, 0), self.group_sn, group_set_sn, is_end=True, writer_set=self.writer_set
                 )
@@ -110,6 +117,7 @@ class PublisherGroup:
             return None
         if is_of_group:
             self.group_sn += 1
+            self._last_group_sns[writer] = self.group_sn
         if is_coherent:
             self._set_sns.setdefault(writer, number)
             if is_of_group and not self._group_set_sn:

@@ -53,18 +53,20 @@ _PairKey = tuple[Guid, Guid]  # reader, writer
 class _Pair:
     """A reader of ours and a writer of the publisher's that it reads."""
 
-    __slots__ = ("delivered_sn", "group_sn", "proxy", "told")
+    __slots__ = ("delivered_sn", "group_sn", "past", "proxy", "told")
 
     def __init__(self, proxy: WriterProxy) -> None:
         self.proxy = proxy
         self.group_sn = 0  # all of its changes up to this group number have come
         self.delivered_sn = 0
-        self.told: tuple[int, int] | None = None  # up to that number it has all, up to that group number
+        # Up to that number, which has that group number, it has all that it wrote up to the last one.
+        self.told: tuple[int, int, int] | None = None
+        self.past = (0, 0)  # what the writer wrote last that is not for this reader: its number, and group number
 
     def progress(self) -> int:
         """The group number up to which nothing more is to come from this writer."""
         if self.told is not None and max(self.delivered_sn + 1, self.proxy.next_sn) > self.told[0]:
-            self.group_sn = max(self.group_sn, self.told[1])
+            self.group_sn = max(self.group_sn, self.told[2])
         return self.group_sn
 
     def has_lost_before(self, number: int) -> bool:
@@ -74,6 +76,21 @@ class _Pair:
         all of its part in a set was replaced since, the set is what is left of it.
         """
         return not self.proxy.is_local and number > max(self.delivered_sn, self.proxy.historical_sn) + 1
+
+    def settle_past(self) -> None:
+        """Nothing has come yet, and what is known to be there is not for this reader."""
+        if self.told is not None and not self.delivered_sn and self.told[0] < self.proxy.next_sn:
+            self.past = self.told[:2]
+
+    def may_have_missed(self, group_set_sn: int, end_sn: int) -> bool:
+        """The writer ends a set under this number, and nothing of it came: was its part written before the match?
+
+        Where that is not told, the worst is assumed; but one that tells nothing of its publisher is believed.
+        """
+        if self.told is None or self.delivered_sn or end_sn == 1 or self.proxy.needs_historical_data:
+            return False
+        past_sn, past_group_sn = self.past
+        return past_sn != end_sn - 1 or past_group_sn >= group_set_sn
 
     @property
     def is_behind(self) -> bool:
@@ -200,11 +217,16 @@ class SubscriberGroup:
         """The reader is closed: what waited for it alone is forgotten."""
         member = self._members.pop(reader, None)
         self._withheld.pop(reader, None)
-        for key in [key for key in self._of_pair if key[0] == reader]:
-            del self._of_pair.pop(key).pairs[key]
         for publisher in self._publishers.values():
             for _, _, unit in publisher.queue:
                 unit.changes = [entry for entry in unit.changes if entry[0] is not member]
+        for key in [key for key in self._of_pair if key[0] == reader]:
+            publisher = self._of_pair.pop(key)
+            del publisher.pairs[key]
+            for unit in publisher.sets.values():
+                unit.begun.pop(key, None)
+            if not publisher.pairs:
+                self._forget_sets(publisher)
 
     def writer_matched(self, reader: Guid, proxy: WriterProxy) -> None:
         """``proxy`` is what ``reader`` knows of the writer."""
@@ -226,25 +248,35 @@ class SubscriberGroup:
             return
         pair = publisher.pairs.pop(key)
         for unit in list(publisher.sets.values()):
-            may_lack = key in unit.begun or not (has_said_all or self._has_passed(pair, unit, now))
+            is_past = bool(unit.ended) and self._has_passed(pair, unit, now)  # till then nobody knows where the end is
+            may_lack = key in unit.begun or not (has_said_all or is_past)
             if key not in unit.ended and may_lack:
                 self._give_up(publisher, unit, "a writer was gone before the end of its coherent set")
         if not may_return and not publisher.pairs:
-            publisher.past_sets.clear()
+            self._forget_sets(publisher)
         self._release_of(publisher, now)
 
-    def told(self, reader: Guid, writer: Guid, last_sn: int, group_sn: int, now: float) -> None:
-        """A HEARTBEAT: up to ``last_sn`` the writer has all that it wrote, up to this group number."""
+    def _forget_sets(self, publisher: _Publisher) -> None:
+        """Nobody here reads it any more: who does later begins anew."""
+        for unit in list(publisher.sets.values()):
+            if not unit.ended:
+                self._give_up(publisher, unit, "its publisher was gone before the end of its coherent set")
+        publisher.past_sets.clear()
+
+    def told(self, reader: Guid, writer: Guid, last_sn: int, last_group_sn: int, group_sn: int) -> None:
+        """A HEARTBEAT, before anything is delivered for it: up to ``last_sn``, which has ``last_group_sn``, the writer
+        has all that it wrote up to ``group_sn``.  :meth:`passed` is to follow."""
         publisher = self._of_pair.get((reader, writer))
         if publisher is not None:
-            publisher.pairs[(reader, writer)].told = (last_sn, group_sn)
-            self._release_of(publisher, now)
+            publisher.pairs[(reader, writer)].told = (last_sn, last_group_sn, group_sn)
 
     def passed(self, reader: Guid, writer: Guid, now: float) -> None:
         """Numbers of this writer are known not to come, or nothing more is known to be under way."""
         publisher = self._of_pair.get((reader, writer))
-        if publisher is not None and publisher.queue:
-            self._release_of(publisher, now)
+        if publisher is not None:
+            publisher.pairs[(reader, writer)].settle_past()
+            if publisher.queue:
+                self._release_of(publisher, now)
 
     def withheld(self) -> list[Guid]:
         """The readers for whose samples there was no room here, which may be given again."""
@@ -309,6 +341,9 @@ class SubscriberGroup:
             return False
         if member.policy.coherent_access:
             unit = self._unit_of(publisher, coherence.group_set_sn, now)
+            pair = publisher.pairs.get((member.reader, end.writer_guid))
+            if unit is not None and pair is not None and pair.may_have_missed(unit.group_sn, end.sequence_number):
+                self._give_up(publisher, unit, "a reader came in the middle of the coherent set")
             self._note(publisher, member, end, since=end, before_sn=coherence.group_set_sn + 1)
             self._ended(publisher, unit, member, end, end)
         else:  # all that it means here is its place in the order
@@ -423,7 +458,9 @@ class SubscriberGroup:
 
     def _has_passed(self, pair: _Pair, unit: _Unit, now: float) -> bool:
         """Has this writer nothing to send any more that belongs into the unit, or before it?"""
-        if pair.proxy.is_local or pair.progress() >= (unit.end_sn if unit.is_set else unit.group_sn - 1):
+        if pair.progress() >= (unit.end_sn if unit.is_set else unit.group_sn - 1):
+            return True
+        if pair.proxy.is_local and not unit.is_set:
             return True
         if not pair.proxy.is_reliable:
             return not unit.is_set

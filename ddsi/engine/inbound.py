@@ -409,7 +409,7 @@ class Inbound:
                     local.sets.filtered(proxy.guid, number, number + 1)
                 reader.receive_gap(proxy, number, NumberSet(number + 1), incoming.now)
                 self._engine.proxy_touched(reader, proxy)
-                self._engine.presentation.gap(local, proxy, incoming.now)
+                self._engine.presentation.passed(local, proxy, incoming.now)
 
     def _change(self, incoming: Incoming, remote: RemoteWriter, reader_id: bytes, change: CacheChange) -> None:
         """To every matched reader that it is addressed to."""
@@ -633,6 +633,7 @@ class Inbound:
         pairs = self._pairs(incoming, heartbeat.writer_id, heartbeat.reader_id)
         for local, proxy in pairs:
             due = proxy.schedule.due
+            self._engine.presentation.heartbeat(local, proxy, heartbeat)
             lost = local.behavior.receive_heartbeat(
                 proxy, heartbeat.first_sn, heartbeat.last_sn, heartbeat.count, incoming.now, final=heartbeat.final
             )
@@ -640,7 +641,7 @@ class Inbound:
                 self._engine.samples_lost(local, proxy, lost, heartbeat.first_sn - lost, SampleLossReason.NOT_AVAILABLE)
             if proxy.schedule.due != due:
                 self._engine.proxy_touched(local.behavior, proxy)
-            self._engine.presentation.heartbeat(local, proxy, heartbeat, incoming.now)
+            self._engine.presentation.passed(local, proxy, incoming.now)
             restarted = restarted or proxy.contradictions >= _CONTRADICTIONS_OF_A_RESTART
         self._forget_settled(incoming, heartbeat.writer_id)
         # A participant that may not say in clear that it changed does not begin anew by its numbers: HEARTBEATs of the
@@ -674,7 +675,7 @@ class Inbound:
                 local.sets.gap_received(proxy.guid, gap.gap_start, gap.gap_list, gap.filtered_count)
             local.behavior.receive_gap(proxy, gap.gap_start, gap.gap_list, incoming.now)
             self._engine.proxy_touched(local.behavior, proxy)
-            self._engine.presentation.gap(local, proxy, incoming.now)
+            self._engine.presentation.passed(local, proxy, incoming.now)
         self._forget_settled(incoming, gap.writer_id)
 
     def _forget_settled(self, incoming: Incoming, writer_id: bytes) -> None:

@@ -129,13 +129,12 @@ class LocalWriter:
                 current_gsn = unsent.coherence.group_sn - 1
                 break
         first, last = behavior.cache.get(first_sn), behavior.cache.get(last_sn)
-        return HeartbeatGroupInfo(
-            current_gsn,
-            first.coherence.group_sn if first is not None and first.coherence is not None else current_gsn + 1,
-            last.coherence.group_sn if last is not None and last.coherence is not None else current_gsn,
-            group.writer_set,
-            bytes(4),
-        )
+        # What all have acknowledged may be out of the cache; how far it went is worth telling to those who come now.
+        last_gsn = min(group.last_of(self.guid), current_gsn)
+        if last is not None and last.coherence is not None:
+            last_gsn = last.coherence.group_sn
+        first_gsn = first.coherence.group_sn if first is not None and first.coherence is not None else last_gsn + 1
+        return HeartbeatGroupInfo(current_gsn, first_gsn, last_gsn, group.writer_set, bytes(4))
 
     def match_changed(self, reader: Guid, change: int) -> Status:
         """One matched reader more (+1) or less (-1)."""

@@ -303,6 +303,7 @@ class Matchmaker:
             reader.guid, reader.liveliness_changed(writer.guid, alive=int(is_alive), not_alive=int(not is_alive))
         )
         engine.local_delivery.deliver(writer, reader, now)
+        engine.presentation.local_writer_matched(reader, writer, now)
 
     # --- the end of a pair -------------------------------------------------------------------------------
 

@@ -430,8 +430,8 @@ class Participant:
         self.now = now
         if reader.guid not in self.local_readers:
             return
+        self.presentation.reader_gone(reader, now)  # first: that it goes spoils no set for the others
         self.matchmaker.reader_gone(reader, now)
-        self.presentation.reader_gone(reader, now)
         self.hooks.local_endpoint_deleted(reader.guid)
         del self.local_readers[reader.guid]
         self.alarms.forget_reader(reader.guid)

@@ -186,6 +186,13 @@ class Presentation:
         if reader.subscriber is not None and proxy is not None:
             reader.subscriber.writer_matched(reader.guid, proxy)
 
+    def local_writer_matched(self, reader: LocalReader, writer: LocalWriter, now: float) -> None:
+        """What a HEARTBEAT would tell: what it wrote before is here, or was not for this reader."""
+        if reader.subscriber is not None and writer.group is not None:
+            last_sn, group = writer.behavior.cache.last_sn, writer.group
+            reader.subscriber.told(reader.guid, writer.guid, last_sn, group.last_of(writer.guid), group.group_sn)
+            reader.subscriber.passed(reader.guid, writer.guid, now)
+
     def writer_unmatched(
         self, reader: LocalReader, writer: Guid, reason: LossReason, now: float, *, may_return: bool
     ) -> None:
@@ -197,18 +204,16 @@ class Presentation:
                 reader.guid, writer, now, has_said_all=reason is LossReason.CLOSED, may_return=may_return
             )
 
-    def heartbeat(self, reader: LocalReader, proxy: WriterProxy, heartbeat: Heartbeat, now: float) -> None:
-        """It may say how far the writer's publisher is."""
-        if reader.subscriber is None:
-            return
-        if heartbeat.group_info is not None:
-            current_gsn = heartbeat.group_info.current_gsn
-            reader.subscriber.told(reader.guid, proxy.guid, heartbeat.last_sn, current_gsn, now)
-        else:
-            reader.subscriber.passed(reader.guid, proxy.guid, now)
+    def heartbeat(self, reader: LocalReader, proxy: WriterProxy, heartbeat: Heartbeat) -> None:
+        """It may say how far the writer's publisher is.  To be told before anything is delivered for it."""
+        info = heartbeat.group_info
+        if reader.subscriber is not None and info is not None:
+            reader.subscriber.told(reader.guid, proxy.guid, heartbeat.last_sn, info.last_gsn, info.current_gsn)
 
-    def gap(self, reader: LocalReader, proxy: WriterProxy, now: float) -> None:
-        """Numbers are known not to come: something may have waited for that."""
+    def passed(self, reader: LocalReader, proxy: WriterProxy, now: float) -> None:
+        """A GAP or a HEARTBEAT: numbers are known not to come, and something may have waited for that."""
+        if reader.sets is not None:
+            reader.sets.passed(proxy.guid, proxy.next_sn, now)
         if reader.subscriber is not None:
             reader.subscriber.passed(reader.guid, proxy.guid, now)
 

@@ -122,6 +122,19 @@ def test_a_gap_of_which_not_all_was_filtered_leaves_something_missing() -> None:
     assert bench.seen() == []
 
 
+def test_a_part_that_lacks_a_number_for_good_is_not_kept_until_its_writer_speaks_again() -> None:
+    """What ends it may be among those that never come."""
+    for is_filtered in (True, False):
+        bench = Bench()
+        bench.put(1, of=1)
+        bench.sets.passed(W1, 2, 0.0)
+        assert bench.sets.begun_count == 1
+        if is_filtered:
+            bench.sets.filtered(W1, 2, 4)
+        bench.sets.passed(W1, 4, 0.0)
+        assert (bench.sets.begun_count, bench.lost) == ((1, []) if is_filtered else (0, [(1, 1)]))
+
+
 def test_a_writer_that_is_gone_takes_its_unfinished_set_with_it() -> None:
     bench = Bench()
     bench.put(1, of=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -136,7 +137,8 @@ class Bench:
         return taken
 
     def told(self, who: int, group_sn: int) -> None:
-        self.group.told(R[who], W[who], self.numbers[who], group_sn, self.now)
+        self.group.told(R[who], W[who], self.numbers[who], group_sn, group_sn)
+        self.group.passed(R[who], W[who], self.now)
 
     def seen(self) -> list[int]:
         """Group numbers of what became visible, in that order; taken."""
@@ -238,6 +240,72 @@ def test_a_writer_that_is_lost_may_have_had_a_part_that_never_came() -> None:
             bench.put(who, 2, 1, end=True)
         bench.group.writer_unmatched(R[1], W[1], 0.0, has_said_all=has_said_all)
         assert bench.seen() == expected
+
+
+def test_a_writer_that_is_lost_before_anyone_ended_the_set_may_have_had_more_to_say() -> None:
+    bench = Bench()
+    bench.put(0, 1, 1)
+    bench.told(1, 1)  # nothing so far
+    bench.group.writer_unmatched(R[1], W[1], 0.0, has_said_all=False)
+    for who in (0, 2):
+        bench.put(who, 3, 1, end=True)
+    assert (bench.seen(), bench.lost) == ([], 1)
+
+
+def test_a_reader_that_is_closed_takes_its_part_of_a_set_with_it_and_no_more() -> None:
+    bench = Bench()
+    bench.put(0, 1, 1)
+    bench.put(1, 2, 1)
+    bench.group.leave(R[1])
+    bench.sinks[1].writer_unmatched(W[1], 0.0)
+    for who in (0, 2):
+        bench.put(who, 3, 1, end=True)
+    assert bench.seen() == [1]
+
+
+def test_when_all_readers_are_closed_nothing_is_left_of_an_open_set() -> None:
+    bench = Bench()
+    bench.put(0, 1, 1)
+    for reader in R:
+        bench.group.leave(reader)
+    bench.group.release(0.0)
+    assert (bench.group.octets, bench.group._publishers) == (0, {})
+
+
+@pytest.mark.parametrize(
+    ("is_told", "last_group_sn", "expected"),
+    [(True, 2, []), (True, 0, [1]), (False, 0, [1])],
+)
+def test_what_a_reader_missed_of_a_set_before_its_match_keeps_the_others_from_it(
+    is_told: bool, last_group_sn: int, expected: list[int]
+) -> None:
+    """Its writer says how far it was; one that does not is believed to have had no part."""
+    bench = Bench()
+    bench.put(0, 1, 1)
+    bench.numbers[1], proxy = 4, bench.proxies[1]  # 4 were written before
+    proxy.reorder.next_sn, proxy.last_seq, proxy.historical_sn = 5, 4, 4
+    if is_told:
+        bench.group.told(R[1], W[1], 4, last_group_sn, 2)
+        bench.group.passed(R[1], W[1], bench.now)
+    for who in range(3):
+        bench.put(who, 3, 1, end=True)
+    assert bench.seen() == expected
+    bench.put(0, 4, 4)
+    for who in range(3):
+        bench.put(who, 5, 4, end=True)
+    assert bench.seen() == [4], "and the next is seen"
+
+
+def test_a_part_that_lacks_a_number_for_good_holds_nobody_up() -> None:
+    bench = Bench()
+    bench.put(0, 1, 1)
+    bench.put(1, 2, 1)
+    for who in (0, 2):
+        bench.put(who, 4, 1, end=True)
+    bench.put(0, 5)
+    assert bench.seen() == []
+    bench.sinks[1].passed(W[1], 3, bench.now)  # a GAP; the end was in it too
+    assert (bench.seen(), bench.lost) == ([5], 2)
 
 
 def test_lost_publishers_are_remembered_up_to_a_bound() -> None:

@@ -10,7 +10,7 @@ from ddsi.discovery.endpoint_parameters import decode_writer, encode_writer
 from ddsi.messages.data import Data
 from ddsi.messages.gap import Gap
 from ddsi.messages.header import Header
-from ddsi.messages.heartbeat import Heartbeat
+from ddsi.messages.heartbeat import Heartbeat, HeartbeatGroupInfo
 from ddsi.messages.raw_submessage import SubmessageKind, iterate_submessages
 from ddsi.serialization.parameter_id import ParameterId as P
 from ddsi.serialization.parameter_list import ParameterList
@@ -20,6 +20,7 @@ from ddsi.structure.guid import EntityId, EntityKind
 from ddsi.structure.qos import Qos
 from ddsi.structure.qos_policies import AccessScope, BestEffort, KeepAll, Presentation, Reliable
 from ddsi.structure.sequence_number import NumberSet
+from ddsi.structure.status import SampleLost
 from ddsi.structure.vendor import PROTOCOL_VERSION
 from tests.engine.xor_security import XorSecurity
 
@@ -38,6 +39,8 @@ class Overheard:
 
     data: list[tuple[int, dict[P, str]]] = field(default_factory=list)
     group_sns: list[int] = field(default_factory=list)
+    writers: list[NodeWriter] = field(default_factory=list)
+    infos: list[HeartbeatGroupInfo] = field(default_factory=list)
 
     def __call__(self, sender: bytes, octets: bytes) -> None:
         for raw in iterate_submessages(octets):
@@ -50,6 +53,7 @@ class Overheard:
                 heartbeat = Heartbeat.decode(raw.flags, raw.body)
                 if heartbeat.group_info is not None:
                     self.group_sns.append(heartbeat.group_info.current_gsn)
+                    self.infos.append(heartbeat.group_info)
 
 
 def overheard(policy: Presentation) -> Overheard:
@@ -72,6 +76,7 @@ def overheard(policy: Presentation) -> Overheard:
             writer.write()
     b.write()
     domain.run(1)
+    heard.writers = [a, b]
     return heard
 
 
@@ -112,6 +117,14 @@ def test_with_group_scope_changes_are_numbered_over_all_writers() -> None:
     ]
     assert sorted(map(repr, said)) == sorted(repr(dict(sorted(row.items(), key=_as_sent))) for row in expected)
     assert max(heard.group_sns) == 6
+
+
+def test_a_heartbeat_says_which_number_its_writer_wrote_last_also_where_all_have_it() -> None:
+    """RTPS 2.5 §8.3.8.6: who is matched later learns whether it missed something of the open set."""
+    heard = overheard(Presentation(GROUP, coherent_access=True))
+    assert all(info.first_gsn - 1 <= info.last_gsn <= info.current_gsn for info in heard.infos)
+    a, b = heard.writers
+    assert [writer.local.group_info(4, 3).last_gsn for writer in (a, b)] == [5, 6]  # type: ignore[union-attr]
 
 
 def _as_sent(entry: tuple[P, str]) -> int:
@@ -227,6 +240,16 @@ def test_what_was_filtered_out_of_a_set_is_not_missing() -> None:
     spoken.data(4, set_sn(1))
     spoken.data(5)
     assert spoken.seen() == [1, 4, 5]
+
+
+def test_a_gap_within_a_set_tells_at_once_that_it_is_lost() -> None:
+    """Its end may be among what will not come, and the writer silent from then on."""
+    spoken = Spoken()
+    spoken.data(1, set_sn(1))
+    gap = Gap(EntityId.UNKNOWN, spoken.writer.guid.entity_id, 2, NumberSet(4))
+    spoken.hear(gap.encode())
+    lost = [status.total_count for status in spoken.node.statuses_of(SampleLost) if isinstance(status, SampleLost)]
+    assert lost == [1]
 
 
 def test_who_does_not_ask_sees_samples_at_once_and_no_ends() -> None:
